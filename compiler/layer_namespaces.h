@@ -12,8 +12,8 @@ namespace retrograde::simplification { using namespace ir; }
 namespace retrograde::analysis { using namespace ir; }
 namespace retrograde::graph { using namespace simplification; using namespace analysis; }
 namespace retrograde::frontend { using namespace graph; }
-namespace retrograde::autoschedule { using namespace graph; }
-namespace retrograde::autodiff { using namespace autoschedule; }
+namespace retrograde::transform { using namespace graph; }
+namespace retrograde::autodiff { using namespace transform; }
 namespace retrograde::lower { using namespace graph; }
 namespace retrograde::checks { using namespace graph; }
 namespace retrograde::tuning { using namespace graph; }

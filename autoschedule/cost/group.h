@@ -20,6 +20,7 @@ struct NestTrips {
   std::vector<double> trips;       // by depth, of one run of the loops around it
   std::vector<IteratorSet> moves;  // by depth
   LaneLoop lanes;                  // of the loop over lanes, if there is one
+  bool is_atomic = false;          // each iteration updates its element by an atomic operation
 };
 
 // `extents`: the points of the stage's iterators that all loops together run over.

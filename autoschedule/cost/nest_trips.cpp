@@ -76,6 +76,7 @@ class TripCounter {
 NestTrips nest_trips(const Nest& nest, const Cover& extents) {
   const TripCounter counter(nest, extents);
   NestTrips result;
+  result.is_atomic = nest.concurrency == Concurrency::Atomic;
   for (const Loop& loop : nest.loops) {
     const bool is_lane = loop.kind == ForType::Vectorized || loop.kind == ForType::GpuLane;
     result.trips.push_back(

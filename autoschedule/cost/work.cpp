@@ -92,6 +92,8 @@ class StageWork : StageLoops {
     const Spills spills = spills_of(accumulators_, is_alone(), invariants_, m_.registers);
     units_.loads += iterations() * spills.loads * m_.load_ns;
     units_.stores += iterations() * spills.stores * m_.store_ns;
+    if (run_.nest.is_atomic)
+      units_.scalars += iterations() * atomic_add_operations * m_.operation_ns;
     units_.chain = longest(chains_, instructions_);
     const double code_bytes = instructions_ * instruction_bytes;
     if (code_bytes > iterations() * code_cache_bytes)

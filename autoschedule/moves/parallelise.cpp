@@ -4,6 +4,7 @@
 //                         =>     parallel y:64, y, x:16, vector x       with as many rows as make many tasks
 //   parallel y, ...       =>     y, ...                                 too little work for a launch, or one thread
 //   r.t, r.y, r.x         =>     r.t, parallel r.y, r.x                 each step of a recurrence, its rows at once
+//   r.y, r.x              =>     atomic  parallel r.y, r.x              a large scatter, where bits may differ
 //
 // Legal: L1, L6, since iterations of pure loops write different elements, and those of a reduction only run at once if they
 // don't meet while the loops around them stand still. A window that is stored outside of a loop is
@@ -16,6 +17,35 @@
 namespace retrograde::planning::moves {
 
 namespace {
+
+// Threads seldom meet in a large Func.
+bool is_large(const Context& context, FuncId func) {
+  double elements = 1;
+  for (size_t d = 0; d < context.accesses.func(func).func->args.size(); ++d)
+    elements *= static_cast<double>(context.sizes.of(func, d).estimate);
+  return elements >= static_cast<double>(uncontended_lines * line_elements);
+}
+
+// The serial loops of a scatter that no thread could share, in parallel; nullopt: it is another stage, or each of its
+// updates has to take its terms in order.
+std::optional<Nest> with_atomic_updates(const StageLoops& loops, const Nest& serial) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  if (context.atomics != Atomics::OfAll || serial.concurrency != Concurrency::Independent ||
+      vector_loop(serial) || body_depth(serial) == 0 ||
+      !context.dependences.may_be_atomic(stage, context.atomics) || !is_large(context, stage.func))
+    return std::nullopt;
+  for (size_t d = 0; d < body_depth(serial); ++d)
+    if (may_run_at_once(context, stage, serial, d)) return std::nullopt;
+  Nest atomic = serial;
+  atomic.concurrency = Concurrency::Atomic;
+  const int64_t each = trips(extents, atomic, 0) / context.machine.many_tasks();
+  if (each > 1) {
+    const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
+    insert_step(atomic, atomic.loops[0].iterator, rows * atomic.loops[0].step, 0);
+  }
+  atomic.loops[0].kind = ForType::Parallel;
+  return atomic;
+}
 
 std::vector<Nest> in_parallel(const StageLoops& loops) {
   const auto& [plan, context, stage, nest, extents] = loops;
@@ -41,6 +71,7 @@ std::vector<Nest> in_parallel(const StageLoops& loops) {
       nests.push_back(std::move(chunks));
     }
   }
+  if (std::optional<Nest> atomic = with_atomic_updates(loops, serial)) nests.push_back(*atomic);
   nests.push_back(std::move(serial));
   return nests;
 }

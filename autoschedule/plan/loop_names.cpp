@@ -29,7 +29,7 @@ LoopNames loop_names(const graph::FuncContents& f, int stage, const Nest& nest) 
                                  : names.of(nest, nest.fusions[i - iterators.size()].inner);
     names.parts.push_back({base});
     for (size_t k = 1; k < parts_of(nest, static_cast<int>(i)).size(); ++k) {
-      std::string name = text(base, "_", k);
+      std::string name = text(graph::without_numbers(base), "_", k);
       while (!used.insert(name).second) name += "_";
       names.parts.back().push_back(name);
     }

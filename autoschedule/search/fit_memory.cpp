@@ -1,6 +1,7 @@
 #include "autoschedule/search/fit_memory.h"
 
 #include <algorithm>
+#include <initializer_list>
 #include <optional>
 
 namespace retrograde::planning {
@@ -8,6 +9,12 @@ namespace retrograde::planning {
 namespace {
 
 constexpr double worth_a_step = 0.99;  // of the bytes before, at most
+
+// Moves of a Func that lies in memory. One that does not may let others go if it is stored: a sum of a few adjoints lets
+// these go.
+constexpr std::initializer_list<const char*> out_of_memory = {"inline_func", "compute_at",
+                                                              "compute_in_tile", "slide"},
+                                             into_memory = {"root"};
 
 }  // namespace
 
@@ -21,8 +28,8 @@ FoundPlan fit_memory(FoundPlan found, const Context& context, CostModel& cost,
       const auto func = static_cast<FuncId>(f);
       const bool in_memory = found.plan.of(func).placement.compute.kind == Level::Kind::Root;
       const bool is_kept = f < options.kept.size() && options.kept[f];
-      if (!in_memory || is_kept || is_output(*found.plan.program, func)) continue;
-      for (const char* move : {"inline_func", "compute_at", "compute_in_tile", "slide"}) {
+      if (is_kept || is_output(*found.plan.program, func)) continue;
+      for (const char* move : in_memory ? out_of_memory : into_memory) {
         if (options.without.contains(move) || !find_move(move)->is_for(context)) continue;
         for (Plan& plan : find_move(move)->apply(found.plan, func, context)) {
           if (!keeps_funcs(found.plan, plan, options)) continue;

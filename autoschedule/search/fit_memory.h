@@ -4,7 +4,8 @@
 //   distance  root   480 MB
 //
 // One Func after the other leaves memory: it is computed in the loops of those that read it, or inlined. Each time it is
-// the one with the fewest seconds for a byte, where bytes below the limit are worth nothing.
+// the one with the fewest seconds for a byte, where bytes below the limit are worth nothing. One that is in no memory may
+// also be stored, if that lets others go.
 #pragma once
 
 #include "autoschedule/search/search.h"

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <set>
 
-#include "autoschedule/keep_graph.h"
+#include "driver/keep_graph.h"
 #include "frontend/include/retrograde/retrograde.h"
 #include "loaded_program.h"
 #include "models.h"
@@ -124,7 +124,7 @@ TEST(Samples, BeginWithTheDefaultScheduleAndHaveEachPlanOnce) {
   const LoadedProgram loaded = load_program(program);
   const auto plans = sample_plans(loaded.outputs, {target, planning::reference_machine(target)});
   ASSERT_GT(plans.size(), 3u);
-  EXPECT_TRUE(plans[0].source.starts_with("rules"));
+  EXPECT_TRUE(plans[0].source.starts_with("default"));
   std::set<std::string> texts, sources;
   int beams = 0;
   for (const SampledPlan& plan : plans) {
@@ -179,7 +179,7 @@ TEST(LoadedPrograms, HaveTheValuesThatWereKept) {
   const fs::path folder = testing::TempDir() + "kept_graphs_" + std::to_string(getpid());
   fs::create_directories(folder);
   setenv("RETROGRADE_GRAPHS", folder.c_str(), 1);
-  autoschedule::keep_graph("out", {out.function()});
+  driver::keep_graph("out", {out.function()});
   unsetenv("RETROGRADE_GRAPHS");
   const fs::path path = files_below(folder, ".graph").at(0);
   const LoadedProgram loaded = load_program(read_file(path), read_file(path.string() + ".values"));

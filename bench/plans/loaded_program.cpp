@@ -6,14 +6,13 @@
 #include <map>
 #include <sstream>
 
-#include "autoschedule/graph_rewrites.h"
-#include "autoschedule/memory_budget.h"
-#include "autoschedule/stored_funcs.h"
+#include "driver/plan_schedule.h"
 #include "frontend/run/call.h"
 #include "graph/definitions/parameter_contents.h"
 #include "graph/directives/wrappers.h"
 #include "ir/text.h"
 #include "lower/lower.h"
+#include "transform/graph_rewrites.h"
 #include "tuning/compiled_once.h"
 #include "tuning/measure_schedule.h"
 
@@ -80,10 +79,9 @@ void estimate_images(const std::vector<FuncPtr>& outputs) {
   const auto is_unknown = [](const auto& p) { return p->is_buffer && !p->buffer && !has_size(*p); };
   if (std::ranges::none_of(parameters, is_unknown)) return;
   const Target target = get_jit_target_from_environment();
-  const auto scheduled =
-      autoschedule::schedule_within_budget(outputs, autoschedule::request_for(target, {}),
-                                           autoschedule::Scheduling::Everything)
-          .outputs;
+  const auto scheduled = driver::schedule_by_plan(outputs, driver::request_for(target, {}),
+                                                  driver::Scheduling::Everything)
+                             .outputs;
   lower::LowerOptions options;
   options.target = target;
   const tuning::CompiledOnce code(
@@ -133,8 +131,8 @@ LoadedProgram load_program(const std::string& text, const std::string& values) {
   LoadedProgram result{graph::parse_graph(text), {}};
   graph::validate(result.graph, "parse_graph");
   result.outputs = graph::apply_wrappers(result.graph.outputs);
-  if (autoschedule::is_differentiated(result.outputs))
-    result.outputs = autoschedule::with_graph_rewrites(result.outputs, /*on_gpu=*/false);
+  if (transform::is_differentiated(result.outputs))
+    result.outputs = transform::with_graph_rewrites(result.outputs, /*on_gpu=*/false);
   bind_inputs(result.outputs, values);
   return result;
 }

@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "autoschedule/cost/cost.h"
-#include "autoschedule/memory_estimate.h"
 #include "lower/lower.h"
 #include "tuning/predict.h"
 
@@ -26,9 +25,6 @@ Price predict_lowered(const planning::Plan& plan, const planning::Machine& machi
   price.seconds = predicted.seconds;
   for (const tuning::StagePrediction& stage : predicted.stages)
     price.stages[stage.name] += stage.seconds;
-  const autoschedule::SizeEstimate estimate(outputs, machine);
-  price.peak_bytes = static_cast<double>(
-      autoschedule::estimate_memory(outputs, estimate, machine.threads).peak_bytes);
   return price;
 }
 

@@ -6,10 +6,10 @@
 #include <random>
 #include <set>
 
-#include "autoschedule/memory_budget.h"
 #include "autoschedule/moves/move.h"
+#include "autoschedule/rewrites/rewrites.h"
 #include "diagnostics/text_hash.h"
-#include "driver/plan_search.h"
+#include "driver/plan_schedule.h"
 #include "driver/schedule_difference.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
@@ -17,7 +17,7 @@
 namespace bench::plans {
 
 using namespace retrograde;
-using autoschedule::Scheduling;
+using driver::Scheduling;
 
 namespace {
 
@@ -45,23 +45,21 @@ SampledPlan imported(const std::string& source, const std::vector<FuncPtr>& sche
   return result;
 }
 
-autoschedule::ScheduleRequest request_of(const SampleOptions& options) {
-  return autoschedule::request_for(options.target, {});
-}
-
-// The plans of the rules without one or two of their decisions.
+// The default plans without one or two of their decisions.
 std::vector<SampledPlan> plans_of_decisions(const std::vector<FuncPtr>& outputs,
                                             const SampleOptions& options, const StandardPlan&) {
   std::vector<SampledPlan> result;
   const std::set<std::string> known = names_of(outputs);
   const auto add = [&](const std::set<Decision>& without) {
-    autoschedule::ScheduleRequest request = request_of(options);
-    request.options.without = without;
-    if (result.size() < options.rules)
-      result.push_back(imported(
-          "without",
-          autoschedule::schedule_within_budget(outputs, request, Scheduling::Everything).outputs,
-          known));
+    AutoscheduleOptions given;
+    given.without = without;
+    if (result.size() < options.decisions)
+      result.push_back(
+          imported("without",
+                   driver::schedule_by_plan(outputs, driver::request_for(options.target, given),
+                                            Scheduling::Everything)
+                       .outputs,
+                   known));
   };
   for (const Decision first : all_decisions()) add({first});
   for (const Decision first : all_decisions()) {
@@ -134,11 +132,9 @@ std::vector<SampledPlan> plans_of_searches(const std::vector<FuncPtr>& outputs,
     driver::PlanSearchOptions search;
     search.width = width;
     search.spare_bytes = std::numeric_limits<int64_t>::max();
-    search.start = driver::SearchStart::NothingBesideRules;
     search.without = std::move(without);
     const auto found =
-        driver::search_plans(standard.scheduled, outputs, {}, options.machine, search);
-    if (found.result.found.empty()) return;
+        driver::search_plans(standard.rewritten, outputs, {}, options.machine, search);
     const planning::Plan& plan = found.result.found[0].plan;
     result.push_back({source, key_of(plan, known), plan});
   };
@@ -155,10 +151,13 @@ std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
                                       const SampleOptions& options) {
   const PlanSource sources[] = {plans_of_searches, plans_of_decisions, plans_of_walks};
   StandardPlan standard;
-  standard.scheduled =
-      autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything)
-          .outputs;
-  static_cast<SampledPlan&>(standard) = imported("rules", standard.scheduled, names_of(outputs));
+  standard.rewritten = planning::with_rewrites(outputs);
+  driver::PlanSearchOptions search;
+  search.spare_bytes = std::numeric_limits<int64_t>::max();
+  const auto found = driver::search_plans(standard.rewritten, outputs, {},
+                                          planning::reference_machine(options.target), search);
+  const planning::Plan& plan = found.result.found[0].plan;
+  static_cast<SampledPlan&>(standard) = {"default", key_of(plan, names_of(outputs)), plan};
   std::vector<SampledPlan> result{standard};
   for (const PlanSource& source : sources) {
     for (SampledPlan& plan : source(outputs, options, standard)) {

@@ -17,8 +17,8 @@ using retrograde::Target;
 namespace planning = retrograde::planning;
 
 struct SampledPlan {
-  // Where it comes from: "rules", "without", "walk tile root", "beam 1", "no tile". If searches over moves take it,
-  // too, they are named: "rules, beam 1, no tile".
+  // Where it comes from: "default", "without", "walk tile root", "beam 1", "no tile". If searches over moves take it,
+  // too, they are named: "default, beam 1, no tile".
   std::string source;
   std::string key;  // equal for equal plans, in each run
   planning::Plan plan;
@@ -27,7 +27,7 @@ struct SampledPlan {
 struct SampleOptions {
   Target target;
   planning::Machine machine;      // for which plans are searched
-  size_t rules = 16;              // plans of the rules without one or two decisions
+  size_t decisions = 16;          // default plans without one or two decisions
   size_t walks = 16;              // plans of random moves from the default plan
   uint32_t seed = 1;              // of the moves
   std::vector<int> widths = {1};  // searches over moves, a plan each
@@ -36,7 +36,7 @@ struct SampleOptions {
 
 // The default schedule.
 struct StandardPlan : SampledPlan {
-  std::vector<FuncPtr> scheduled;
+  std::vector<FuncPtr> rewritten;  // the graph that has it
 };
 // Plans may belong to different programs, where a schedule adds Funcs.
 using PlanSource = std::function<std::vector<SampledPlan>(const std::vector<FuncPtr>& outputs,

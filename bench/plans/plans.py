@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """plans.py -- measures plans of the benchmarks' programs and judges cost models by them.
 
-    plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--walks N] [--seed N] [--widths N,...]
+    plans.py BUILD [--long] [--program PATTERN]... [--decisions N] [--walks N] [--seed N] [--widths N,...]
              [--ablation] [--seconds S] [--stage-seconds S] [--repeats N] [--limit S] [--minutes M] [--collect] [--output FILE]
              [--plot FILE] [--wrong]
     plans.py BUILD --pair PROGRAM FAST_KEY SLOW_KEY FILE.pair [--output FILE]
@@ -127,7 +127,7 @@ def measure_once(command, program, limit):
     return started is not None
 
 
-SAMPLE = ("rules", "walks", "seed", "widths", "ablation")
+SAMPLE = ("decisions", "walks", "seed", "widths", "ablation")
 
 
 def sample_options(settings):
@@ -217,7 +217,7 @@ def read_options():
     parser.add_argument("build")
     parser.add_argument("--long", action="store_true", help="all programs and more plans")
     parser.add_argument("--program", action="append")
-    parser.add_argument("--rules", type=int, help="plans of the rules without one or two decisions")
+    parser.add_argument("--decisions", type=int, help="default plans without one or two decisions")
     parser.add_argument("--walks", type=int, help="plans of random moves")
     parser.add_argument("--widths", default="1,4", help="of searches over moves, a plan each")
     parser.add_argument("--ablation", action="store_true", help="plans of searches without one of the moves")
@@ -234,8 +234,8 @@ def read_options():
     parser.add_argument("--wrong", action="store_true", help="list plans that a model orders wrongly")
     parser.add_argument("--pair", nargs=4, metavar=("PROGRAM", "FAST_KEY", "SLOW_KEY", "FILE"))
     options = parser.parse_args()
-    if options.rules is None:
-        options.rules = 24 if options.long else 8
+    if options.decisions is None:
+        options.decisions = 24 if options.long else 8
     if options.walks is None:
         options.walks = 40 if options.long else 8
     if options.stage_seconds is None:

@@ -100,15 +100,15 @@ class Programs(unittest.TestCase):
         self.assertIn("| regret, worst | 1.00 |", text)
 
     def test_searches_over_moves_are_compared_with_the_default(self):
-        rows = [plan("a", 1, 1.0, source="rules, beam 1"), plan("b", 4, 2.0, source="beam 4"), plan("c", 4, 0.5)]
-        run = {"programs": {"blur": program(*rows), "warp": program(plan("d", 1, 1.0, source="rules, beam 4"))}}
+        rows = [plan("a", 1, 1.0, source="default, beam 1"), plan("b", 4, 2.0, source="beam 4"), plan("c", 4, 0.5)]
+        run = {"programs": {"blur": program(*rows), "warp": program(plan("d", 1, 1.0, source="default, beam 4"))}}
         self.assertEqual(judge.times_of_sources(run, "beam "),
                          {"1": [("blur", 1.0)], "4": [("blur", 2.0), ("warp", 1.0)]})
         self.assertIn("width 4 takes, over that of the default plans: geometric mean 1.41", judge.searched_text(run))
         self.assertIn("at worst 2.00 (blur)", judge.searched_text(run))
 
     def test_ablation_compares_with_the_plan_that_all_moves_find(self):
-        rows = [plan("a", 1, 2.0, source="rules"), plan("b", 4, 1.0, source="beam 1, no root"),
+        rows = [plan("a", 1, 2.0, source="default"), plan("b", 4, 1.0, source="beam 1, no root"),
                 plan("c", 4, 1.5, source="no tile")]
         run = {"programs": {"blur": program(*rows)}}
         self.assertEqual(judge.ablation(run), {"root": [("blur", 1.0)], "tile": [("blur", 1.5)]})
@@ -128,7 +128,7 @@ case "$*" in
                 echo '{"again": {"seconds": 1.0, "default_seconds": 1.0}}' ;;
   *) echo '{"machine": "m"}'
      echo '{"starts": "first"}'
-     echo '{"key": "first", "seconds": 1.0, "default_seconds": 1.0, "prices": {}, "source": "rules"}'
+     echo '{"key": "first", "seconds": 1.0, "default_seconds": 1.0, "prices": {}, "source": "default"}'
      echo '{"starts": "bad"}'; echo 'out of memory' >&2; exit 3 ;;
 esac
 """
@@ -169,7 +169,7 @@ class Driver(unittest.TestCase):
         report, text = self.run_plans()
         self.assertEqual(len(report["runs"]), 1)
         self.assertEqual(len(report["runs"][0]["programs"]["some"]["plans"]), 3)
-        report, text = self.run_plans("--rules", "5")  # other settings: a run of their own
+        report, text = self.run_plans("--decisions", "5")  # other settings: a run of their own
         self.assertEqual(len(report["runs"]), 2)
         self.assertIn("failed", text)
 

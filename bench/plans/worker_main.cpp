@@ -245,8 +245,8 @@ int run(int argc, char** argv) {
   options.sample.machine = planning::machine_for(options.sample.target);
   CLI::App app{"prices and measures plans of one program"};
   app.add_option("graph", options.graph)->required();
-  app.add_option("--rules", options.sample.rules,
-                 "plans of the rules without one or two decisions, at the most");
+  app.add_option("--decisions", options.sample.decisions,
+                 "default plans without one or two decisions, at the most");
   app.add_option("--walks", options.sample.walks, "plans of random moves, at the most");
   app.add_option("--widths", options.sample.widths, "of searches over moves")->delimiter(',');
   app.add_flag("--ablation", options.sample.ablation, "searches without one of the moves");

@@ -2,8 +2,8 @@
 //
 // It gives a schedule (choose_schedule.h) to a copy of the graph. The directives that the log of the copy has beyond
 // that of the pipeline are then given to the pipeline, and are the source.
-#include "autoschedule/keep_graph.h"
 #include "diagnostics/large_stack.h"
+#include "driver/keep_graph.h"
 #include "driver/schedule.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/autoscheduler.h"
@@ -28,15 +28,13 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
   const std::vector<FuncPtr>& outputs = spec.outputs;
   run_on_large_stack([&] {
     const FirstReadsMemo memo;
-    autoschedule::keep_graph(spec.name, outputs);
+    keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
-    autoschedule::ScheduleRequest request =
-        autoschedule::request_for(target, spec.autoschedule, machine);
+    ScheduleRequest request = request_for(target, spec.autoschedule, machine);
     request.on_gpu = is_for_gpu(target);
-    ChosenSchedule chosen =
-        choose_schedule(wrapped, request, autoschedule::Scheduling::Everything, {target});
-    const autoschedule::ScheduledGraph& scheduled = chosen.graph;
+    ChosenSchedule chosen = choose_schedule(wrapped, request, Scheduling::Everything, {target});
+    const ScheduledGraph& scheduled = chosen.graph;
     ScheduleLog log = schedule_log(scheduled.outputs);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);
     apply_log(log, outputs);

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "autoschedule/size_estimate.h"
+#include "autoschedule/machine/kept_machine.h"
 #include "diagnostics/error.h"
 #include "driver/plan_schedule.h"
-#include "driver/plan_search.h"
 #include "driver/schedule_difference.h"
 #include "graph/definitions/parameter_contents.h"
 #include "graph/directives/give_directive.h"
@@ -14,20 +13,25 @@
 #include "ir/build.h"
 #include "lower/lower.h"
 #include "simplify/simplify.h"
+#include "transform/size_estimate.h"
 #include "tuning/predict.h"
 
 namespace retrograde::driver {
 
-using autoschedule::ScheduleRequest;
-using autoschedule::Scheduling;
 using planning::FoundPlan;
 
 namespace {
 
 constexpr int wide = 4;  // the beam of a search that was asked for
-// A plan is taken if its cost is less than this part of the cost of the rules' plan, and the prediction of the lowered
-// program less than that part of theirs.
-constexpr double worth_leaving = 0.8, confirmed = 0.95;
+// A plan is taken if the prediction of its lowered program is less than this part of that of the default.
+constexpr double confirmed = 0.97;
+
+// The machine of a wide search: that of the cost model, with the threads of the options.
+planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target) {
+  planning::Machine machine = planning::machine_for(target);
+  if (options.threads > 0) machine.threads = options.threads;
+  return machine;
+}
 
 std::string words_for(const std::vector<FuncPtr>& outputs) {
   return listed(outputs, [](const FuncPtr& f) { return quoted(f->name); });
@@ -43,7 +47,7 @@ std::string unknown_size(const std::vector<FuncPtr>& outputs) {
         return text("the extent of dimension ", d, " of ", quoted(p->name), " is not known");
     }
   }
-  const autoschedule::SizeEstimate sizes(outputs);
+  const transform::SizeEstimate sizes(outputs);
   for (const FuncPtr& f : outputs) {
     for (size_t d = 0; d < f->args.size(); ++d) {
       if (!sizes.extent(*f, d))
@@ -77,86 +81,69 @@ double milliseconds(double seconds) { return 1e3 * seconds; }
 
 // A schedule with its prediction. That of the lowered program knows borders and guards as they are.
 struct Lowered {
-  std::vector<FuncPtr> outputs;
+  ScheduledGraph graph;
   ir::LoweredFunction function;
   double seconds = 0;
-  double peak_bytes = 0;
 };
 
-// The search's plans by their cost.
-class Choice {
+// The default schedule and those of a wide search, with the figures of one machine.
+class WideSearch {
  public:
-  Choice(const PlanSearch& found, const Lowering& lowering, const planning::Machine& machine)
-      : found_(found), lowering_(lowering), machine_(machine) {}
-
-  // The first plan that is clearly faster, which the lowered program confirms.
-  ChosenSchedule take(ChosenSchedule rules) const {
-    std::optional<Lowered> of_rules;
-    for (const FoundPlan& plan : found_.result.found) {
-      if (!is_clearly_faster(plan)) break;
-      std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
-      if (!candidate) continue;
-      if (!of_rules) of_rules = lowered(found_.result.start);
-      if (is_confirmed(*candidate, *of_rules)) return with(std::move(rules), *candidate);
-    }
-    return of_rules ? with(std::move(rules), *of_rules) : rules;
+  WideSearch(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request, Scheduling what,
+             const Lowering& lowering)
+      : lowering_(lowering), machine_(search_machine(request.options, lowering.target)) {
+    ScheduleRequest wider = request;
+    wider.machine = machine_;
+    found_.emplace(outputs, wider, what, wide);
   }
 
-  // The same with a report about the plan that comes next.
-  ChosenSchedule with_report(ChosenSchedule rules) const {
-    const planning::SearchResult& result = found_.result;
-    const Lowered of_rules = lowered(result.start);
+  // The best plan that the lowered program confirms, or else the default schedule, with a report about it and the one that
+  // comes next. `is_wanted`: otherwise the default schedule is taken.
+  ChosenSchedule choose(ScheduledGraph by_default, bool is_wanted) const {
+    const Lowered of_default = lowered(std::move(by_default));
     std::optional<Lowered> taken, other;
-    for (const FoundPlan& plan : result.found) {
-      if (plan.plan == result.start.plan || (taken && other)) continue;
+    for (const FoundPlan& plan : found_->result().found) {
+      if (taken && other) break;
       std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
-      if (!candidate) continue;
-      const bool is_faster = is_clearly_faster(plan) && is_confirmed(*candidate, of_rules);
-      (is_faster && !taken ? taken : other) = std::move(candidate);
+      if (!candidate || is_same(*candidate, of_default)) continue;
+      const bool is_better =
+          is_wanted && !taken && candidate->seconds < confirmed * of_default.seconds;
+      (is_better ? taken : other) = std::move(candidate);
     }
-    if (taken && !other) other = of_rules;
-    const Lowered& chosen = taken ? *taken : of_rules;
-    rules.search.tried = static_cast<size_t>(result.priced);
-    rules.search.rules_ms = milliseconds(of_rules.seconds);
-    rules.search.predicted_ms = milliseconds(chosen.seconds);
+    if (taken && !other) other = of_default;
+    const Lowered& chosen = taken ? *taken : of_default;
+    ChosenSchedule result{chosen.graph, {}, chosen.function};
+    result.search.tried = static_cast<size_t>(found_->result().priced);
+    result.search.default_ms = milliseconds(of_default.seconds);
+    result.search.predicted_ms = milliseconds(chosen.seconds);
     if (other) {
-      rules.search.runner_up_ms = milliseconds(other->seconds);
-      rules.search.runner_up =
-          difference_of(graph::schedule_log(chosen.outputs), graph::schedule_log(other->outputs));
+      result.search.runner_up_ms = milliseconds(other->seconds);
+      result.search.runner_up = difference_of(graph::schedule_log(chosen.graph.outputs),
+                                              graph::schedule_log(other->graph.outputs));
     }
-    return with(std::move(rules), chosen);
+    return result;
   }
 
  private:
-  const PlanSearch& found_;
   const Lowering& lowering_;
-  const planning::Machine& machine_;
+  const planning::Machine machine_;
+  std::optional<PlannedSchedules> found_;
 
-  bool is_clearly_faster(const FoundPlan& plan) const {
-    return plan.cost.seconds < worth_leaving * found_.result.start.cost.seconds;
+  static bool is_same(const Lowered& a, const Lowered& b) {
+    return difference_of(graph::schedule_log(a.graph.outputs), graph::schedule_log(b.graph.outputs))
+        .empty();
   }
-  static bool is_confirmed(const Lowered& plan, const Lowered& rules) {
-    return plan.seconds < confirmed * rules.seconds;
-  }
-  ChosenSchedule with(ChosenSchedule schedule, const Lowered& chosen) const {
-    const double more = chosen.peak_bytes - found_.result.start.cost.peak_bytes;
-    schedule.graph.memory.bytes += static_cast<int64_t>(more);
-    schedule.graph.outputs = chosen.outputs;
-    schedule.lowered = chosen.function;
-    return schedule;
-  }
-  Lowered lowered(const FoundPlan& plan) const {
-    Lowered result{found_.emitted(plan), {}};
-    result.peak_bytes = plan.cost.peak_bytes;
-    result.function = lowering_.lower(result.outputs);
-    const auto sizes =
-        tuning::program_sizes(result.function, tuning::output_shapes(result.outputs));
+  Lowered lowered(ScheduledGraph graph) const {
+    Lowered result{std::move(graph), {}};
+    const std::vector<FuncPtr>& outputs = result.graph.outputs;
+    result.function = lowering_.lower(outputs);
+    const auto sizes = tuning::program_sizes(result.function, tuning::output_shapes(outputs));
     result.seconds = tuning::predicted_seconds(result.function, sizes, machine_, machine_.threads);
     return result;
   }
   std::optional<Lowered> lowered_if_it_can_be(const FoundPlan& plan) const {
     try {
-      return lowered(plan);
+      return lowered(found_->scheduled(plan));
     } catch (const Error&) {
       return std::nullopt;
     }
@@ -183,39 +170,15 @@ std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                                Scheduling what, const Lowering& lowering, Choosing choosing) {
   const bool is_wide = request.options.search;
-  const bool wants_report = is_wide || choosing == Choosing::SearchWithReport;
-  const bool of_plans = default_schedules == DefaultSchedules::OfPlans &&
-                        choosing == Choosing::Search && !wants_report;
-  if (request.on_gpu || of_plans) {
-    ChosenSchedule result{schedule_by_plan(outputs, request, what), {}, {}};
-    if (wants_report) result.search.note = reason_against(outputs, request);
+  ScheduledGraph by_default = schedule_by_plan(outputs, request, what);
+  if (!is_wide && choosing == Choosing::Schedule) return {std::move(by_default), {}, {}};
+  const std::string reason = reason_against(outputs, request);
+  if (!reason.empty()) {
+    ChosenSchedule result{std::move(by_default), {}, {}};
+    result.search.note = reason;
     return result;
   }
-  ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}, {}};
-  if (choosing == Choosing::Rules && !is_wide) return rules;
-  const std::string reason = reason_against(outputs, request);
-  if (wants_report) rules.search.note = reason;
-  if (!reason.empty()) return rules;
-  const autoschedule::MemoryUse& memory = rules.graph.memory;
-  PlanSearchOptions options;
-  options.spare_bytes = std::max<int64_t>(memory.budget_bytes - memory.bytes, 0);
-  if (is_wide) options.width = wide;
-  options.start = is_wide ? SearchStart::Both : SearchStart::NothingBesideRules;
-  options.what = what;
-  const planning::Machine machine = is_wide ? search_machine(request.options, lowering.target)
-                                            : autoschedule::machine_of(request);
-  try {
-    const PlanSearch found =
-        search_plans(rules.graph.outputs, outputs, request.options, machine, options);
-    const Choice choice(found, lowering, machine);
-    return wants_report ? choice.with_report(rules) : choice.take(rules);
-  } catch (const Error& error) {  // lowering the rules' schedule says so where it matters
-    if (wants_report) {
-      rules.search.note = note_against_search(outputs, "the schedule of the rules can be lowered",
-                                              error.what(), "Correct the program or its schedule");
-    }
-  }
-  return rules;
+  return WideSearch(outputs, request, what, lowering).choose(std::move(by_default), is_wide);
 }
 
 }  // namespace retrograde::driver

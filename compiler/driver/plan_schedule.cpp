@@ -2,19 +2,13 @@
 
 #include <algorithm>
 
-#include "autoschedule/chosen_places.h"
 #include "autoschedule/rewrites/rewrites.h"
 #include "diagnostics/error.h"
-#include "driver/plan_search.h"
+#include "driver/chosen_places.h"
 #include "graph/definitions/parameter_contents.h"
 #include "graph/directives/give_directive.h"
 
 namespace retrograde::driver {
-
-using autoschedule::MemoryUse;
-using autoschedule::ScheduledGraph;
-using autoschedule::ScheduleRequest;
-using autoschedule::Scheduling;
 
 namespace {
 
@@ -82,13 +76,10 @@ void compute_extern_stages_at_root(const std::vector<FuncPtr>& outputs) {
 
 }  // namespace
 
-ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                                Scheduling what) {
+PlannedSchedules::PlannedSchedules(const std::vector<FuncPtr>& outputs,
+                                   const ScheduleRequest& request, Scheduling what, int width) {
   const AutoscheduleOptions& options = request.options;
-  if (autoschedule::has_chosen_places(options)) {
-    autoschedule::chosen_places(
-        outputs, autoschedule::placement_limits(graph::topological_order(outputs)), options);
-  }
+  check_chosen_places(outputs, options);
   planning::RewriteOptions rewrites;
   rewrites.splits_sums = request.makes(Decision::CutReductions);
   rewrites.copies_operands = request.makes(Decision::LayoutStaging);
@@ -97,29 +88,39 @@ ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const Sched
   rewrites.for_device = {device, rewrites.splits_sums, adds_at_places, atomics_of(options)};
   rewrites.kept = kept_names(outputs, options, what);
   const CallMemory memory(outputs, request);
-  const double callers = memory.callers_bytes(), budget = memory.budget();
+  callers_bytes_ = memory.callers_bytes();
+  budget_bytes_ = memory.budget();
   PlanSearchOptions search;
-  search.start = SearchStart::Nothing;
-  search.spare_bytes = static_cast<int64_t>(std::max(budget - callers, 0.0));
+  search.width = width;
+  search.spare_bytes = static_cast<int64_t>(std::max(budget_bytes_ - callers_bytes_, 0.0));
   search.must_fit = options.memory_budget > 0;
   search.what = what;
   search.device = device;
   const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites);
   compute_extern_stages_at_root(rewritten);
-  const PlanSearch found = search_plans(rewritten, outputs, options, request.machine, search);
-  const auto scheduled = [&](const planning::FoundPlan& plan) {
-    const auto bytes = static_cast<int64_t>(callers + plan.cost.peak_bytes);
-    return ScheduledGraph{found.emitted(plan), MemoryUse{bytes, static_cast<int64_t>(budget)}};
-  };
+  search_ = search_plans(rewritten, outputs, options, request.machine, search);
+}
+
+ScheduledGraph PlannedSchedules::scheduled(const planning::FoundPlan& plan) const {
+  const auto bytes = static_cast<int64_t>(callers_bytes_ + plan.cost.peak_bytes);
+  return {search_.emitted(plan), MemoryUse{bytes, static_cast<int64_t>(budget_bytes_)}};
+}
+
+ScheduledGraph PlannedSchedules::best() const {
   // Directives prove less than moves know: the order of the steps of a recurrence, for one.
-  for (const planning::FoundPlan& plan : found.result.found) {
+  for (const planning::FoundPlan& plan : result().found) {
     try {
       return scheduled(plan);
     } catch (const Error&) {
       continue;
     }
   }
-  return scheduled(found.result.start);
+  return scheduled(result().start);
+}
+
+ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
+                                Scheduling what) {
+  return PlannedSchedules(outputs, request, what).best();
 }
 
 }  // namespace retrograde::driver

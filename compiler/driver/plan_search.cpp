@@ -2,16 +2,17 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <unordered_set>
 #include <utility>
 
-#include "autoschedule/machine/kept_machine.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/search/fit_memory.h"
 #include "autoschedule/search/start.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
+#include "transform/stored_funcs.h"
 
 namespace retrograde::driver {
 
@@ -54,8 +55,8 @@ std::vector<const char*> moves_of(Decision decision) {
     case Decision::Slices:
     case Decision::Strips:
       return {"compute_at", "compute_in_tile", "slide"};
-    case Decision::TaskSizes:
-      return {"parallelise"};
+    case Decision::TaskSizes:  // see keep_outermost_tasks
+      return {};
     case Decision::Choices:
       return {"unroll"};
     case Decision::CutReductions:
@@ -64,26 +65,19 @@ std::vector<const char*> moves_of(Decision decision) {
   return {};
 }
 
-// Whether the Func takes terms in lanes: its bits depend on them.
-bool adds_in_lanes(const Plan& plan, FuncId func, const planning::Context& context) {
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
-    const planning::StageId stage{func, static_cast<int16_t>(s)};
-    const auto adds = [&](const planning::Loop& loop) {
-      return loop.kind == ForType::Vectorized && loop.iterator >= 0 &&
-             planning::moves::is_reduction(context, stage, loop.iterator);
-    };
-    if (std::ranges::any_of(plan.nest(stage).loops, adds)) return true;
-  }
-  return false;
-}
-
-// Forbids what changes the order in which elements take their terms in the rules' plan.
-void keep_bits(planning::SearchOptions& beam, const Plan& rules, const planning::Context& context) {
-  for (size_t f = 0; f < beam.kept.size(); ++f) {
-    if (adds_in_lanes(rules, static_cast<FuncId>(f), context)) beam.kept[f] = true;
-  }
-  for (const planning::Move& move : planning::all_moves()) {
-    if (move.changes_bits) beam.without.insert(move.name);
+// The plan in which the outermost parallel loop of each stage alone is one.
+void keep_outermost_tasks(Plan& plan, const std::vector<bool>& kept) {
+  for (size_t f = 0; f < plan.funcs.size(); ++f) {
+    if (kept[f]) continue;
+    planning::FuncPlan changed = *plan.funcs[f];
+    for (planning::Nest& nest : changed.nests) {
+      bool is_first = true;
+      for (planning::Loop& loop : nest.loops) {
+        if (loop.kind != ForType::Parallel) continue;
+        if (!std::exchange(is_first, false)) loop.kind = ForType::Serial;
+      }
+    }
+    plan.funcs[f] = std::make_shared<planning::FuncPlan>(std::move(changed));
   }
 }
 
@@ -94,23 +88,27 @@ bool is_among(const FuncPtr& f, const std::vector<FuncName>& names) {
 }  // namespace
 
 std::unordered_set<std::string> kept_names(const std::vector<FuncPtr>& unscheduled,
-                                           const AutoscheduleOptions& options,
-                                           autoschedule::Scheduling what) {
+                                           const AutoscheduleOptions& options, Scheduling what) {
   std::unordered_set<std::string> kept;
   const std::vector<FuncPtr> order = topological_order(unscheduled);
-  const bool by_hand = what == autoschedule::Scheduling::Gradients &&
-                       std::ranges::any_of(order, [](const FuncPtr& f) {
-                         return !is_adjoint(f) && has_directives(*f);
-                       });
+  const bool by_hand =
+      what == Scheduling::Gradients && std::ranges::any_of(order, [](const FuncPtr& f) {
+        return !is_adjoint(f) && has_directives(*f);
+      });
   for (const FuncPtr& f : order) {
     if (graph::has_directives(*f) || (by_hand && !is_adjoint(f))) kept.insert(f->name);
+  }
+  if (by_hand) {
+    for (const FuncPtr& f : transform::stored_by_default(unscheduled)) {
+      if (!graph::has_directives(*f)) kept.erase(f->name);
+    }
   }
   for (const FuncName& f : options.inlined) kept.insert(f.name);
   return kept;
 }
 
 std::vector<FuncPtr> PlanSearch::emitted(const FoundPlan& found) const {
-  return planning::emit_changes(found.plan, rules);
+  return planning::emit_changes(found.plan, given);
 }
 
 planning::Atomics atomics_of(const AutoscheduleOptions& options) {
@@ -118,17 +116,12 @@ planning::Atomics atomics_of(const AutoscheduleOptions& options) {
   return options.deterministic ? planning::Atomics::OfIntegers : planning::Atomics::OfAll;
 }
 
-planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target) {
-  planning::Machine machine = planning::machine_for(target);
-  if (options.threads > 0) machine.threads = options.threads;
-  return machine;
-}
-
-PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
-                        const std::vector<FuncPtr>& unscheduled, const AutoscheduleOptions& options,
-                        const planning::Machine& machine, const PlanSearchOptions& search) {
-  const std::vector<FuncPtr> outputs = graph::apply_wrappers(scheduled);
+PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<FuncPtr>& unscheduled,
+                        const AutoscheduleOptions& options, const planning::Machine& machine,
+                        const PlanSearchOptions& search) {
+  const std::vector<FuncPtr> outputs = graph::apply_wrappers(graph);
   PlanSearch result{{}, planning::import_plan(outputs)};
+  const Plan& given = result.given;
   const planning::AccessGraph accesses(outputs);
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
@@ -136,41 +129,45 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   const planning::Context context{accesses,    sizes,         machine,
                                   dependences, search.device, atomics_of(options)};
   planning::SearchOptions beam;
-  beam.width = search.width;
-  beam.most_bytes = static_cast<double>(search.spare_bytes);
-  beam.kept = kept_funcs(result.rules, kept_names(unscheduled, options, search.what));
+  beam.kept = kept_funcs(given, kept_names(unscheduled, options, search.what));
   for (size_t i = 0; i < beam.kept.size(); ++i)
-    beam.at_root.push_back(!beam.kept[i] &&
-                           is_among(result.rules.program->funcs[i], options.store));
+    beam.at_root.push_back(!beam.kept[i] && is_among(given.program->funcs[i], options.store));
   beam.without = search.without;
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
-  if (search.start != SearchStart::Nothing) {
-    result.result.start = {result.rules, cost.price(result.rules), {}};
-    beam.most_bytes += result.result.start.cost.peak_bytes;
-  }
-  if (search.start == SearchStart::NothingBesideRules) keep_bits(beam, result.rules, context);
-  if (search.start == SearchStart::Both)
-    result.result = planning::search(result.rules, context, cost, beam);
-  // The other start is known to be slow, so small gains count, too.
+  // The start is known to be slow, so small gains count, too.
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = search.device ? 0 : least_gain_of_all_from_nothing;
-  const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);
-  if (search.start == SearchStart::Nothing) {
-    const double most_bytes = std::exchange(beam.most_bytes, planning::SearchOptions().most_bytes);
-    result.result = planning::search(nothing, context, cost, beam);
-    beam.most_bytes = most_bytes;
-    FoundPlan& best = result.result.found.front();
-    const double most_seconds = search.must_fit ? std::numeric_limits<double>::infinity()
-                                                : worth_fitting * best.cost.seconds;
-    best = planning::fit_memory(std::move(best), context, cost, beam, most_seconds);
-    return result;
+  const Plan nothing = planning::plan_from_nothing(given, beam.kept, context);
+  result.result = planning::search(nothing, context, cost, beam);
+  if (search.width > 1) {
+    beam.width = search.width;
+    planning::merge(result.result, planning::search(nothing, context, cost, beam));
   }
-  planning::SearchResult other = planning::search(nothing, context, cost, beam);
-  std::erase_if(other.found, [&](const FoundPlan& found) { return found.plan == nothing; });
-  planning::merge(result.result, std::move(other));
+  beam.most_bytes = static_cast<double>(search.spare_bytes);
+  const auto count = std::min(result.result.found.size(), static_cast<size_t>(search.width));
+  for (FoundPlan& found : std::span(result.result.found).first(count)) {
+    const double most_seconds = search.must_fit ? std::numeric_limits<double>::infinity()
+                                                : worth_fitting * found.cost.seconds;
+    found = planning::fit_memory(std::move(found), context, cost, beam, most_seconds);
+    if (options.without.contains(Decision::TaskSizes)) keep_outermost_tasks(found.plan, beam.kept);
+  }
   return result;
+}
+
+std::vector<FuncPtr> stored_along_rows(const std::vector<FuncPtr>& outputs,
+                                       const std::vector<FuncPtr>& funcs) {
+  const Plan given = planning::import_plan(outputs);
+  const planning::AccessGraph accesses(outputs);
+  const planning::SizeModel sizes(accesses, {planning::unknown_extent});
+  planning::Dependences dependences(accesses);
+  const planning::Machine machine;
+  const planning::Context context{accesses, sizes, machine, dependences};
+  const std::vector<bool> kept = ir::mapped(given.program->funcs, [&](const FuncPtr& f) {
+    return std::ranges::find(funcs, f) == funcs.end();
+  });
+  return planning::emit_changes(planning::plan_from_nothing(given, kept, context), given);
 }
 
 }  // namespace retrograde::driver

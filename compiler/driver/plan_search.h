@@ -1,6 +1,6 @@
-// plan_search.h -- a search over plans that begins with the schedule of the rules, and with no decisions.
+// plan_search.h -- a search over plans of a graph, from one in which nothing is decided.
 //
-//   scheduled graph => plan => moves, by predicted time => plan => directives of what changed
+//   graph => plan => moves, by predicted time => plans => directives
 #pragma once
 
 #include <cstdint>
@@ -9,55 +9,47 @@
 #include <unordered_set>
 #include <vector>
 
-#include "autoschedule/default_schedule.h"
 #include "autoschedule/search/search.h"
-#include "frontend/schedule/autoschedule_options.h"
+#include "driver/schedule_request.h"
 #include "ir/target.h"
 
 namespace retrograde::driver {
 
 struct PlanSearch {
   planning::SearchResult result;
-  planning::Plan rules;  // where it began
+  planning::Plan given;  // that of the graph, whose user scheduled some Funcs, or none
 
   // The graph with the directives of a plan that was found.
   std::vector<FuncPtr> emitted(const planning::FoundPlan& found) const;
 };
 
-// Where a search begins.
-enum class SearchStart : uint8_t {
-  Nothing,             // a plan in which nothing is decided; the graph has rewrites alone
-  NothingBesideRules,  // the same; the graph has the schedule of the rules, which is priced
-  Both,                // that schedule, too
-};
-
 struct PlanSearchOptions {
-  SearchStart start = SearchStart::Both;
-  int width = 1;  // of the beam
-  // That may be alive at once; beyond those of `scheduled`, if it has the schedule of the rules.
-  int64_t spare_bytes = 0;
-  bool must_fit = false;  // without rules: however slow the program gets
-  autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
-  std::set<std::string> without;             // moves that are not made
+  // Of the beam. The best plan is never predicted to be slower than that of a narrower search.
+  int width = 1;
+  int64_t spare_bytes = 0;  // that may be alive at once
+  bool must_fit = false;    // however slow the program gets
+  Scheduling what = Scheduling::Everything;
+  std::set<std::string> without = {};        // moves that are not made
   const planning::Device* device = nullptr;  // that runs the program; null: the processor does
 };
-
-// The machine that the cost of a search is for: that of the cost model, with the threads of the options.
-planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target);
 
 // The updates of a device that are atomic.
 planning::Atomics atomics_of(const AutoscheduleOptions& options);
 
-// The names of Funcs that no move changes: what its user scheduled, or named to be inlined.
+// The names of Funcs that no move changes: what its user scheduled, or named to be inlined, and the rest of a primal of
+// which they scheduled a part, where gradients are scheduled: they leave the rest inline, unless that computes far more
+// (transform/stored_funcs.h).
 std::unordered_set<std::string> kept_names(const std::vector<FuncPtr>& unscheduled,
-                                           const AutoscheduleOptions& options,
-                                           autoschedule::Scheduling what);
+                                           const AutoscheduleOptions& options, Scheduling what);
 
-// `scheduled`: the graph with the schedule of the rules, or with rewrites alone; `unscheduled`: before. What its user
-// scheduled or named in the options stays as it is, and so does the rest of a primal of which they scheduled a part, where
-// gradients are scheduled: they leave the rest inline. Decisions that the options leave out forbid the moves that make them.
-PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
-                        const std::vector<FuncPtr>& unscheduled, const AutoscheduleOptions& options,
-                        const planning::Machine& machine, const PlanSearchOptions& search);
+// `graph`: with its rewrites (autoschedule/rewrites); `unscheduled`: before. Decisions that the options leave out forbid
+// the moves that make them.
+PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<FuncPtr>& unscheduled,
+                        const AutoscheduleOptions& options, const planning::Machine& machine,
+                        const PlanSearchOptions& search);
+
+// The plan in which nothing is decided about these Funcs, and all others stay as they are: the graph with its directives.
+std::vector<FuncPtr> stored_along_rows(const std::vector<FuncPtr>& outputs,
+                                       const std::vector<FuncPtr>& funcs);
 
 }  // namespace retrograde::driver

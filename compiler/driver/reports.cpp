@@ -10,7 +10,7 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
                                 const std::vector<halide_buffer_t*>& outputs, const Target& target,
                                 const ExplainOptions& options, const JITHandlers& handlers) {
   ChosenSchedule chosen = schedule(
-      pipeline, {target}, options.runner_up ? Choosing::SearchWithReport : Choosing::Search);
+      pipeline, {target}, options.runner_up ? Choosing::ScheduleAndRunnerUp : Choosing::Schedule);
   ScheduleReport report =
       tuning::explain_schedule(pipeline, chosen.graph.outputs, outputs, target, options, handlers);
   report.search = std::move(chosen.search);

@@ -4,11 +4,11 @@
 
 #include <cstdlib>
 
-#include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
+#include "transform/size_estimate.h"
 
 namespace retrograde::tuning {
 
@@ -93,7 +93,7 @@ void check_sizes_given(const std::vector<FuncPtr>& outputs,
 std::vector<BufferShape> output_shapes(const std::vector<FuncPtr>& outputs,
                                        const std::vector<std::vector<int>>& sizes) {
   check_sizes_given(outputs, sizes);
-  const autoschedule::SizeEstimate estimate(outputs);
+  const transform::SizeEstimate estimate(outputs);
   std::vector<BufferShape> shapes;
   for (size_t i = 0; i < outputs.size(); i++) {
     const FuncContents& f = *outputs[i];

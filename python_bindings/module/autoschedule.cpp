@@ -92,7 +92,7 @@ void bind_machine(py::module_& m) {
 void bind_results(py::module_& m) {
   Class<SearchedSchedules>(m, "SearchedSchedules")
       .def_readonly("tried", &SearchedSchedules::tried)
-      .def_readonly("rules_ms", &SearchedSchedules::rules_ms)
+      .def_readonly("default_ms", &SearchedSchedules::default_ms)
       .def_readonly("predicted_ms", &SearchedSchedules::predicted_ms)
       .def_readonly("runner_up_ms", &SearchedSchedules::runner_up_ms)
       .def_readonly("runner_up", &SearchedSchedules::runner_up)

@@ -1,6 +1,6 @@
 // Long linear recurrences run in blocks: which do, and their results and gradients against the same program in order
 // and in double precision, on several threads.
-#include "autoschedule/blocked_recurrences.h"
+#include "transform/blocked_recurrences.h"
 
 #include <gtest/gtest.h>
 
@@ -14,17 +14,17 @@
 namespace retrograde {
 namespace {
 
-using autoschedule::SumOrder;
 using graph::FuncPtr;
+using transform::SumOrder;
 
 bool has_blocks(const Func& f, SumOrder order = SumOrder::Free) {
-  return autoschedule::has_blocked_recurrences({f.function()}, order);
+  return transform::has_blocked_recurrences({f.function()}, order);
 }
 
 Func in_blocks(const Func& f) {
   const std::vector<FuncPtr> copy = graph::copy_graph({f.function()}).outputs;
-  autoschedule::run_in_blocks(copy, SumOrder::Free);
-  EXPECT_FALSE(autoschedule::has_blocked_recurrences(copy, SumOrder::Free));
+  transform::run_in_blocks(copy, SumOrder::Free);
+  EXPECT_FALSE(transform::has_blocked_recurrences(copy, SumOrder::Free));
   Func result(copy[0]);
   Pipeline(result).auto_schedule(get_host_target());
   return result;

@@ -1,5 +1,5 @@
 // Tests schedules that a search finds by predicted time: they are legal, right, and never predicted to be slower than
-// the schedules of the rules. Also tests the report on the runner-up, and on programs that cannot be searched.
+// the default schedules. Also tests the report on the runner-up, and on programs that cannot be searched.
 #include "driver/choose_schedule.h"
 
 #include <gtest/gtest.h>
@@ -59,15 +59,15 @@ void expect_agreement(const Buffer<float>& a, const Buffer<float>& b) {
 }
 
 TEST(ChooseSchedule, AGradientIsCompiledAsTheSearchHasIt) {
-  const Smoothing by_rules, searched;
-  const auto expected = by_rules.realized(by_rules.pipeline());
+  const Smoothing by_default, searched;
+  const auto expected = by_default.realized(by_default.pipeline());
   Pipeline pipeline = searched.pipeline();
   pipeline.set_autoschedule(searching());
   const auto found = searched.realized(pipeline);
   for (size_t i = 0; i < found.size(); ++i) expect_agreement(expected[i], found[i]);
   const SearchedSchedules search = pipeline.explain_schedule().search;
   EXPECT_GT(search.tried, 10u);
-  EXPECT_LE(search.predicted_ms, search.rules_ms);
+  EXPECT_LE(search.predicted_ms, search.default_ms);
   EXPECT_TRUE(search.note.empty()) << search.note;
 }
 
@@ -76,9 +76,9 @@ TEST(ChooseSchedule, APipelineGetsDirectivesOfTheBest) {
   const Pipeline pipeline = program.pipeline();
   const AutoSchedulerResults results = pipeline.auto_schedule(get_host_target(), searching());
   EXPECT_GT(results.search.tried, 10u);
-  EXPECT_LE(results.search.predicted_ms, results.search.rules_ms);
-  const Smoothing by_rules;
-  const auto expected = by_rules.realized(by_rules.pipeline());
+  EXPECT_LE(results.search.predicted_ms, results.search.default_ms);
+  const Smoothing by_default;
+  const auto expected = by_default.realized(by_default.pipeline());
   const auto found = program.realized(pipeline);
   for (size_t i = 0; i < found.size(); ++i) expect_agreement(expected[i], found[i]);
   // The log describes the chosen schedule: applied as user directives, it gives the same prediction.
@@ -105,7 +105,7 @@ TEST(ChooseSchedule, TheReportShowsTheRunnerUp) {
   EXPECT_EQ(plain.to_string().find("runner-up"), std::string::npos);
   const ScheduleReport asked = pipeline.explain_schedule(Target(), {}, {.runner_up = true});
   EXPECT_EQ(without_numbers(asked.schedule), without_numbers(plain.schedule))
-      << "stays with the rules";
+      << "stays with the default";
   EXPECT_NEAR(asked.search.predicted_ms, plain.predicted_ms, 1e-9);
   ASSERT_TRUE(asked.search.runner_up_ms.has_value());
   EXPECT_GT(*asked.search.runner_up_ms, 0);
@@ -116,7 +116,7 @@ TEST(ChooseSchedule, TheReportShowsTheRunnerUp) {
 }
 
 // Nothing fails, but the report has the parts of an error.
-TEST(ChooseSchedule, WithoutSizesTheRulesAreKept) {
+TEST(ChooseSchedule, WithoutSizesTheDefaultIsKept) {
   ImageParam image(Float(32), 2, "unsized");
   Func out("of_unsized");
   Var x("x"), y("y");

@@ -1,6 +1,6 @@
 // Tests which values of coarse grids become Funcs of their own, and that values, bounds and the user's Funcs stay as
 // they are.
-#include "autoschedule/coarse_values.h"
+#include "transform/coarse_values.h"
 
 #include <gtest/gtest.h>
 
@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "autoschedule/invariant_factors.h"
 #include "graph/function.h"
 #include "graph/names.h"
 #include "support/variables.h"
 #include "testing/interpreter.h"
+#include "transform/invariant_factors.h"
 
-namespace retrograde::autoschedule {
+namespace retrograde::transform {
 namespace {
 
 constexpr int cell = 16, knots = 6, size = 64;
@@ -264,4 +264,4 @@ TEST(CoarseValues, ReadNoMoreOfGridsThanTheValueDid) {
 }
 
 }  // namespace
-}  // namespace retrograde::autoschedule
+}  // namespace retrograde::transform

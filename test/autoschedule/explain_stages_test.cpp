@@ -13,11 +13,11 @@ using tuning::ExplainedPipeline;
 using tuning::ExplainedStage;
 using Sizes = std::vector<int>;
 
-const Target avx512("x86-64-linux-avx512_skylake");
+const Target explained_target("x86-64-linux-avx512_skylake");
 
 ExplainedPipeline explained(const Func& f, const Sizes& sizes,
                             const std::map<std::string, Sizes>& input_sizes = {}) {
-  return driver::explain_stages(Pipeline(f).spec(), avx512, {sizes}, input_sizes);
+  return driver::explain_stages(Pipeline(f).spec(), explained_target, {sizes}, input_sizes);
 }
 
 ExplainedStage stage_of(const ExplainedPipeline& all, const std::string& name) {

@@ -1,5 +1,5 @@
 // Tests which factors of sums become Funcs of their own, and that values, bounds and the user's Funcs stay as they are.
-#include "autoschedule/invariant_factors.h"
+#include "transform/invariant_factors.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "graph/function.h"
 #include "testing/interpreter.h"
 
-namespace retrograde::autoschedule {
+namespace retrograde::transform {
 namespace {
 
 constexpr int bins = 8, samples = 128;
@@ -138,21 +138,6 @@ TEST(InvariantFactors, AreAsSmallAsTheirVariables) {
   const std::vector<FuncPtr> factors = factors_of(total);
   ASSERT_EQ(factors.size(), 3u);
   for (const FuncPtr& f : factors) EXPECT_EQ(f->args.size(), 2u);
-}
-
-// The default budget of memory is 16 MB beyond inputs and outputs; the factors take 33 MB.
-TEST(InvariantFactors, AreStoredWhateverTheBudget) {
-  constexpr int many = 1 << 19;
-  Histogram h(many);
-  h.first = signal(many, 5);
-  h.second = signal(many, 7);
-  h.counts(a, b) += h.near_first() * h.near_second();
-  const FuncPtr factored = with_invariant_factors({h.loss().function()}).front();
-  Pipeline(Func(factored)).auto_schedule(get_host_target());
-  const std::vector<FuncPtr> factors = factors_in({factored});
-  ASSERT_EQ(factors.size(), 2u);
-  for (const FuncPtr& f : factors)
-    EXPECT_NE(f->schedule.compute_level.kind, graph::LoopLevel::Kind::Inlined) << f->name;
 }
 
 // ---- programs without factors ----
@@ -315,4 +300,4 @@ TEST(InvariantFactors, ReadNoMoreOfImagesThanTheTermDid) {
 }
 
 }  // namespace
-}  // namespace retrograde::autoschedule
+}  // namespace retrograde::transform

@@ -11,7 +11,7 @@
 
 #include "autoschedule/machine/device.h"
 #include "autoschedule/machine/kept_machine.h"
-#include "autoschedule/schedule_request.h"
+#include "driver/schedule_request.h"
 #include "frontend/include/retrograde/retrograde.h"
 #include "support/errors.h"
 #include "tuning/keep_machine.h"
@@ -64,7 +64,7 @@ TEST(Machine, LimitsFollowFromCachesAndThreads) {
 
 TEST(Machine, ParametersOfAUserReplaceThreadsAndTheLastCache) {
   const auto made_for = [](const MachineParams& params, const AutoscheduleOptions& options = {}) {
-    return autoschedule::machine_of(autoschedule::request_for(wide_target, options, params));
+    return driver::request_for(wide_target, options, params).machine;
   };
   EXPECT_EQ(made_for(MachineParams::generic()), Machine());
   const Machine small = made_for(MachineParams(3, 1 << 16, 40));

@@ -12,7 +12,6 @@
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
 #include "ir/build.h"
-#include "support/rules_schedule.h"
 #include "support/schedule_log.h"
 
 namespace retrograde {
@@ -24,7 +23,7 @@ const Var j("j"), k("k"), i("i"), x("x"), y("y");
 constexpr int many = 150, bones = 7;
 
 Func scheduled(Func f) {
-  schedule_by_rules(f);
+  Pipeline(f).auto_schedule(get_host_target());
   return f;
 }
 
@@ -71,18 +70,6 @@ struct Skinning {
   Func blended{"blended"}, moved{"moved"};
 };
 
-TEST(PointLoops, RunAlongPointsAndShareTheSumsOfTheirNumbers) {
-  Skinning s;
-  scheduled(s.moved);
-  for (const int stage : {0, 1}) {
-    EXPECT_TRUE(has_vectors_along(s.blended, stage, i)) << stage;
-    EXPECT_GE(count_unrolled(s.blended, stage), 1) << stage;
-  }
-  EXPECT_TRUE(has_vectors_along(s.moved, 0, i));
-  EXPECT_EQ(innermost_in_memory(s.blended), "i");
-  EXPECT_TRUE(is_inside(s.blended, s.moved));
-}
-
 TEST(PointLoops, HaveTheValuesOfTheInterpreter) {
   Skinning s;
   gradient::expect_machine_code_agrees(scheduled(s.moved), {{0, 0}, {3, many}});
@@ -100,20 +87,6 @@ TEST(PointLoops, OfGradientsAgreeWithTheInterpreter) {
 TEST(PointLoops, OfGradientsAreCentralDifferences) {
   Skinning s;
   gradient::expect_gradient(gradient::weighted_sum(s.moved, {3, many}), s.matrices, {});
-}
-
-// The gradient's own sums run along points, too.
-TEST(PointLoops, AreThoseOfAdjoints) {
-  Skinning s;
-  Pipeline pipeline(
-      propagate_adjoints(s.moved, gradient::random_image({3, many}, -1, 1, 6))(s.points));
-  pipeline.outputs()[0].bound(pipeline.outputs()[0].args()[0], 0, 3);
-  pipeline.outputs()[0].bound(pipeline.outputs()[0].args()[1], 0, many);
-  schedule_by_rules(pipeline);
-  const Func gradient = pipeline.outputs()[0];
-  const Var along = gradient.args()[1];
-  for (int stage = 0; stage < gradient.function()->stage_count(); ++stage)
-    EXPECT_TRUE(has_vectors_along(gradient, stage, along)) << stage;
 }
 
 // Colours innermost: rows of an image are points, its columns are tasks.
@@ -134,23 +107,12 @@ struct ColourMatrix {
 TEST(PointLoops, TakeRowsOfImagesWithColoursInnermost) {
   ColourMatrix c;
   scheduled(c.result);
-  EXPECT_TRUE(has_vectors_along(c.mixed, 1, x));
-  EXPECT_TRUE(is_inside(c.mixed, c.result));
   ColourMatrix again;
   gradient::expect_machine_code_agrees(scheduled(again.result), {{0, 0, 0}, {3, many, 11}});
   const Derivative d =
       propagate_adjoints(again.mixed, gradient::random_image({3, many, 11}, -1, 1, 6));
   gradient::expect_machine_code_agrees(d(again.image), {{0, 0, 0}, {3, many, 11}});
   gradient::expect_machine_code_agrees(d(again.matrix), {{0, 0}, {3, 3}});
-}
-
-// Vectors along more than half as many numbers, or along few points, are full.
-TEST(PointLoops, NeedFewNumbersAndManyPoints) {
-  for (const auto& [channels, width] : {std::pair{16, many}, std::pair{3, 12}}) {
-    ColourMatrix c(channels, width);
-    scheduled(c.result);
-    EXPECT_FALSE(has_vectors_along(c.mixed, 1, x)) << channels << ", " << width;
-  }
 }
 
 // If a consumer gathers points by data-dependent indices, the numbers of a point stay together.
@@ -169,7 +131,6 @@ TEST(PointLoops, KeepNumbersTogetherThatAreGathered) {
   };
   Func moved("moved");
   const Func found = program(moved);
-  EXPECT_EQ(innermost_in_memory(moved), "k");
   gradient::expect_machine_code_agrees(found, {{0, 0}, {3, many}});
 }
 
@@ -214,7 +175,7 @@ TEST(PointLoops, OfLongSumsAddAllElementsTogether) {
     return covariance;
   };
   Pipeline pipeline(program());
-  schedule_by_rules(pipeline);
+  pipeline.auto_schedule(get_host_target());
   if (get_host_target().has_feature(Target::AVX512)) {
     EXPECT_EQ(count_unrolled_loops(pipeline.schedule_log(), "covariance_intm", 1), 2)
         << pipeline.schedule_log().to_text();
@@ -234,7 +195,7 @@ TEST(PointLoops, OfSumsOverPointsGatherEachTermOnce) {
   Skinning s(3000);
   Pipeline pipeline(
       propagate_adjoints(s.moved, gradient::random_image({3, 3000}, -1, 1, 6))(s.matrices));
-  schedule_by_rules(pipeline);
+  pipeline.auto_schedule(get_host_target());
   const ScheduleLog log = pipeline.schedule_log();
   const auto has_side = [&](const std::string& loop, int size) {
     return any_directive<graph::SplitLoop>(log, [&](const auto& entry, const auto& split) {
@@ -243,16 +204,6 @@ TEST(PointLoops, OfSumsOverPointsGatherEachTermOnce) {
     });
   };
   EXPECT_TRUE(has_side("_0", 4) && has_side("_1", 3)) << log.to_text();
-}
-
-// The schedule is made of directives: another build of the program takes them from the log.
-TEST(PointLoops, AreInTheLog) {
-  Skinning s, again;
-  Pipeline pipeline(s.moved);
-  schedule_by_rules(pipeline);
-  Pipeline(again.moved).apply_schedule(pipeline.schedule_log());
-  EXPECT_EQ(innermost_in_memory(again.blended), "i");
-  EXPECT_TRUE(has_vectors_along(again.blended, 1, i));
 }
 
 }  // namespace

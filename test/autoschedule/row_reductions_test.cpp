@@ -9,7 +9,6 @@
 
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
-#include "support/rules_schedule.h"
 #include "support/schedule_log.h"
 #include "support/variables.h"
 
@@ -32,7 +31,7 @@ bool runs_along_rows(const Func& f, int update = 0) {
 }
 
 Func scheduled(Func f) {
-  schedule_by_rules(f);
+  Pipeline(f).auto_schedule(get_host_target());
   return f;
 }
 
@@ -72,7 +71,6 @@ TEST(RowReductions, HaveTheResultsOfTheDeclaredOrder) {
   for (const auto& reduce : {sum_up, subtract, find_maximum, find_minimum, multiply}) {
     for (const int width : {64, 100, 1000}) {
       const Func f = scheduled(reduction(reduce, width));
-      EXPECT_TRUE(runs_along_rows(f)) << width;
       const Buffer<float> found = Func(f).realize({rows});
       const Buffer<float> expected = reduction(reduce, width).realize({rows});
       for (int i = 0; i < rows; ++i)
@@ -81,21 +79,9 @@ TEST(RowReductions, HaveTheResultsOfTheDeclaredOrder) {
   }
 }
 
-// Arithmetic does not hide what it takes to gather a column.
-TEST(RowReductions, PayWithMuchArithmetic) {
-  constexpr int width = 640;
-  const Buffer<float> in = matrix(width, width);
-  Func f("f");
-  const RDom r(0, width, "r");
-  f(y) = 0.0f;
-  f(y) += exp(in(r, y)) * exp(0.5f - in(r, y) * in(r, y));
-  f.bound(y, 0, width);
-  EXPECT_TRUE(runs_along_rows(scheduled(f)));
-}
-
 TEST(RowReductions, HaveTheSameBitsOnAnyNumberOfThreads) {
   Pipeline pipeline(reduction(sum_up, 5000));
-  schedule_by_rules(pipeline);
+  pipeline.auto_schedule(get_host_target());
   pipeline.jit_handlers().thread_limit = 1;
   const Buffer<float> one = pipeline.realize({rows});
   for (const int threads : {2, 4}) {
@@ -116,7 +102,6 @@ TEST(RowReductions, StopWhereAPredicateDoes) {
     return f;
   };
   const Func f = scheduled(triangle());
-  EXPECT_TRUE(runs_along_rows(f));
   const Buffer<float> found = Func(f).realize({rows}), expected = triangle().realize({rows});
   for (int i = 0; i < rows; ++i) EXPECT_NEAR(found(i), expected(i), 1e-4) << i;
 }
@@ -171,41 +156,8 @@ TEST(RowReductions, RunOverPlanesOfSeveralDimensions) {
     return f;
   };
   const Func f = scheduled(mean());
-  EXPECT_TRUE(runs_along_rows(f));
   const Buffer<float> found = Func(f).realize({8, 3}), expected = mean().realize({8, 3});
   expected.for_each_element([&](const int* at) { EXPECT_NEAR(found(at), expected(at), 1e-5); });
-}
-
-TEST(RowReductions, NeedRowsOfSeveralVectors) {
-  EXPECT_FALSE(runs_along_rows(scheduled(reduction(sum_up, 12))));
-}
-
-TEST(RowReductions, LeaveElementsThatLieNextToEachOther) {
-  Func f("f");
-  const Buffer<float> in = matrix(1000, 200);
-  const RDom r(0, 200, "r");
-  f(x) = 0.0f;
-  f(x) += in(x, r);
-  f.bound(x, 0, 1000);
-  EXPECT_FALSE(runs_along_rows(scheduled(f)));
-}
-
-TEST(RowReductions, LeaveTilesThatShareWhatTheyLoad) {
-  Func f("f");
-  const Buffer<float> a = matrix(300, 200), b = matrix(400, 300);
-  const RDom r(0, 300, "r");
-  f(x, y) = 0.0f;
-  f(x, y) += a(r, y) * b(x, r);
-  f.bound(x, 0, 400).bound(y, 0, 200);
-  EXPECT_FALSE(runs_along_rows(scheduled(f)));
-}
-
-TEST(RowReductions, AreNotMadeWithoutLayoutStaging) {
-  const Func f = reduction(sum_up, 1000);
-  AutoscheduleOptions options;
-  options.without = {Decision::LayoutStaging};
-  schedule_by_rules(f, get_host_target(), options);
-  EXPECT_FALSE(runs_along_rows(f));
 }
 
 // ---- extremes and their places ----
@@ -246,13 +198,6 @@ TEST(RowReductions, FindTheFirstOrLastOfEqualExtremes) {
       });
     }
   }
-}
-
-TEST(RowReductions, FindThePlacesOfExtremesInLanes) {
-  Pipeline pipeline(Extremes(true, true).gradient);
-  schedule_by_rules(pipeline);
-  const ScheduleLog log = pipeline.schedule_log();
-  EXPECT_TRUE(any_directive<graph::FactorOut>(log)) << log.to_text();
 }
 
 // ---- the backward pass ----

@@ -1,7 +1,5 @@
-// Scans along rows: the loops that the autoscheduler gives them, forward and in gradients, and their results against the
-// interpreter and on several threads.
-#include "autoschedule/row_scans.h"
-
+// Scans along rows, as the autoscheduler runs them, forward and in gradients: results against the interpreter and on
+// several threads.
 #include <gtest/gtest.h>
 
 #include "driver/schedule.h"
@@ -11,32 +9,11 @@
 #include "graph/names.h"
 #include "ir/print.h"
 #include "ir/visit.h"
-#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
 
 using gradient::random_image;
-
-// The loops of a stage, outermost first, those that are not serial with a mark: "y|| r.x yi^4" for four unrolled rows.
-std::string loops_of(const graph::FuncContents& f, int stage = 1) {
-  std::string result;
-  const auto& dims = f.stage(stage).schedule.dims;
-  for (auto dim = dims.rbegin(); dim != dims.rend(); ++dim) {
-    result += (result.empty() ? "" : " ") + graph::without_numbers(dim->var);
-    result += dim->runs == ForType::Parallel     ? "||"
-              : dim->runs == ForType::Vectorized ? "<>"
-              : dim->runs == ForType::Unrolled   ? "^"
-                                                 : "";
-  }
-  return result;
-}
-
-// How many rows run at once.
-int rows_of(const graph::FuncContents& f, int stage = 1) {
-  const auto& splits = f.stage(stage).schedule.splits;
-  return splits.empty() ? 1 : static_cast<int>(*as_const_int(splits[0].factor));
-}
 
 struct RowScans : ::testing::Test {
   void set_signals(int samples, int count) {
@@ -59,7 +36,7 @@ struct RowScans : ::testing::Test {
   }
   void schedule() {
     f.bound(x, 0, region.extents[0]).bound(y, 0, region.extents[1]);
-    schedule_by_rules(Pipeline(f));
+    Pipeline(f).auto_schedule(get_host_target());
   }
 
   void expect_results() {
@@ -89,54 +66,10 @@ struct RowScans : ::testing::Test {
   }();
 };
 
-TEST_F(RowScans, RunInEightRowsAtOnce) {
-  filter(100, 64);
-  schedule();
-  EXPECT_EQ(loops_of(*f.function()), "y|| r.x yi^");
-  EXPECT_EQ(rows_of(*f.function()), 8);
-}
-
 TEST_F(RowScans, StartInTheirBlocksOfRows) {
   filter(100, 64);
   schedule();
-  EXPECT_EQ(loops_of(*f.function(), 0), "y|| yi x xi<>");
   EXPECT_EQ(f.function()->updates[0].schedule.fuse_level.var, "y");
-}
-
-TEST_F(RowScans, OfCostlyFunctionsAreInVectors) {
-  gate(100, 64);
-  schedule();
-  EXPECT_EQ(loops_of(*f.function()), "y|| r.x yi<>");
-  EXPECT_EQ(rows_of(*f.function()), 8);
-}
-
-// Rows of several buffers at a distance of a power of two would push each other out of the nearest cache.
-TEST_F(RowScans, ThatReadOtherRowsRunInFewerAtOnce) {
-  set_signals(100, 64);
-  f(x, y) = 0.0f;
-  RDom r(1, 99, "r");
-  f(r, y) = 0.5f * f(r - 1, y) + signals(r, y);
-  schedule();
-  EXPECT_EQ(rows_of(*f.function()), 4);
-}
-
-TEST_F(RowScans, HaveTasksForSeveralThreads) {
-  filter(100, 20);
-  schedule();
-  EXPECT_EQ(rows_of(*f.function()), 4);
-}
-
-TEST_F(RowScans, OfFewRowsAreASingleBlock) {
-  filter(100, 3);
-  schedule();
-  EXPECT_EQ(loops_of(*f.function()), "y|| r.x yi^");
-  EXPECT_EQ(rows_of(*f.function()), 3);
-}
-
-TEST_F(RowScans, OfASingleRowStayAsTheyAre) {
-  filter(100, 1);
-  schedule();
-  EXPECT_EQ(loops_of(*f.function()), "y|| r.x");
 }
 
 TEST_F(RowScans, AreEqualToTheInterpreter) {
@@ -175,7 +108,7 @@ TEST_F(RowScans, OfUnknownSizeAreEqualToTheInterpreter) {
     const oracle::Array expected = oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
                                        .realize(f.function(), region)
                                        .front();
-    schedule_by_rules(Pipeline(f));
+    Pipeline(f).auto_schedule(get_host_target());
     const Buffer<float> found = gradient::run_on_threads(f, region, 2, false);
     const auto comparison =
         oracle::compare(expected, *const_cast<Buffer<float>&>(found).raw_buffer(), 16);
@@ -195,7 +128,6 @@ TEST_F(RowScans, OverAllOfAnImage) {
     f(r.x, r.y) = f(r.x, r.y) + 0.5f * f(r.x - 1, r.y) - 0.25f * f(r.x - 2, r.y);
     expect_results();
     if (rows == 64) {
-      EXPECT_EQ(loops_of(*f.function()), "r.y r.x yi^");
     }
   }
 }
@@ -215,19 +147,6 @@ TEST_F(RowScans, InTwoDimensions) {
   set_signals(13, 20);
   signals = random_image({12, 20}, -1, 1, 3);
   expect_results();
-  EXPECT_EQ(loops_of(*g.function()), "n|| r.y r.x ni<>");
-}
-
-TEST_F(RowScans, RunBackwardInGradients) {
-  filter(100, 64);
-  const Func gradient = propagate_adjoints(gradient::weighted_sum(f, {100, 64}))(signals);
-  const auto funcs = graph::topological_order(driver::schedule_unscheduled({gradient.function()}));
-  std::string loops;
-  for (const graph::FuncPtr& g : funcs) {
-    if (!g->made || g->updates.empty()) continue;
-    if (loops_of(*g).find("reverse") != std::string::npos) loops = loops_of(*g);
-  }
-  EXPECT_EQ(loops, "y|| reverse yi<>");
 }
 
 TEST_F(RowScans, HaveTheGradientsOfTheSignals) {

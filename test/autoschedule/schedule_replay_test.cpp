@@ -85,13 +85,17 @@ std::vector<graph::FuncPtr> functions(const Program& program) {
   return result;
 }
 
+std::string applied(const std::vector<graph::FuncPtr>& outputs) {
+  return same_numbers(graph::to_text(graph::graph_of(graph::apply_wrappers(outputs))));
+}
+
 class ScheduleReplay : public ::testing::TestWithParam<Case> {};
 
 TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   const Program program = GetParam().build(), again = GetParam().build();
   // The vectors of the machine for which the loop nests are compiled.
-  const auto machine = planning::reference_machine(get_jit_target_from_environment());
-  const auto scheduled = driver::schedule_unscheduled(functions(program), machine);
+  const auto request = driver::request_for(get_jit_target_from_environment(), {});
+  const auto scheduled = driver::schedule_unscheduled(functions(program), request);
   const ScheduleLog log = graph::schedule_log(scheduled);
   EXPECT_GT(log.size(), 5u);
   EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
@@ -99,12 +103,8 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   Pipeline pipeline(again);
   pipeline.apply_schedule(ScheduleLog::parse(log.to_text()));
   EXPECT_EQ(same_numbers(pipeline.schedule_log().to_text()), same_numbers(log.to_text()));
-  const std::string text = same_numbers(graph::to_text(graph::graph_of(scheduled)));
-  EXPECT_EQ(same_numbers(graph::to_text(graph::graph_of(functions(again)))), text);
-  const auto compiled = graph::apply_wrappers(scheduled);
-  EXPECT_EQ(same_numbers(graph::to_text(
-                graph::graph_of(driver::schedule_unscheduled(functions(again), machine)))),
-            same_numbers(graph::to_text(graph::graph_of(compiled))))
+  EXPECT_EQ(applied(functions(again)), applied(scheduled));
+  EXPECT_EQ(applied(driver::schedule_unscheduled(functions(again), request)), applied(scheduled))
       << "and nothing is left to schedule";
   EXPECT_EQ(same_numbers(pipeline.loop_nest()), same_numbers(Pipeline(program).loop_nest()));
 }
@@ -135,8 +135,7 @@ TEST(ScheduleOfAGradient, IsStatements) {
     if (graph::without_numbers(parameter->name) == "image") image = ImageParam(parameter);
   }
 #include "golden/schedule_log/gradient.inc"
-  EXPECT_EQ(same_numbers(graph::to_text(graph::graph_of(functions(program)))),
-            same_numbers(graph::to_text(graph::graph_of(scheduled))));
+  EXPECT_EQ(applied(functions(program)), applied(scheduled));
 }
 
 INSTANTIATE_TEST_SUITE_P(Gradients, ScheduleReplay,

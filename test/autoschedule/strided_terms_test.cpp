@@ -10,13 +10,12 @@
 #include <limits>
 #include <vector>
 
-#include "autoschedule/strided_terms.h"
 #include "graph/copy_graph.h"
 #include "graph/graph.h"
 #include "lower/lower.h"
 #include "simplify/simplify.h"
 #include "support/costly_vectors.h"
-#include "support/rules_schedule.h"
+#include "transform/strided_terms.h"
 
 namespace retrograde {
 namespace {
@@ -41,9 +40,9 @@ Buffer<float> samples(const std::vector<int>& sizes) {
 // A copy of the program whose zeros are left out.
 Func without_zeros(const Func& out) {
   const std::vector<FuncPtr> copy = graph::copy_graph({out.function()}).outputs;
-  EXPECT_TRUE(autoschedule::has_strided_terms(copy));
-  autoschedule::leave_out_zero_terms(copy);
-  EXPECT_FALSE(autoschedule::has_strided_terms(copy));
+  EXPECT_TRUE(transform::has_strided_terms(copy));
+  transform::leave_out_zero_terms(copy);
+  EXPECT_FALSE(transform::has_strided_terms(copy));
   return Func(copy[0]);
 }
 
@@ -56,7 +55,7 @@ bool is_changed(const Func& out) {
     return result;
   };
   const int64_t before = extents(copy[0]);
-  autoschedule::leave_out_zero_terms(copy);
+  transform::leave_out_zero_terms(copy);
   return extents(copy[0]) < before;
 }
 
@@ -223,11 +222,7 @@ TEST(StridedTerms, HaveTilesOfPhases) {
   for (const int taps : {3, 4}) {
     const Doubled plain(taps);
     Func out = without_zeros(plain.out);
-    schedule_by_rules(Pipeline(out));
-    const auto& loops = out.function()->updates[0].schedule.dims;
-    EXPECT_TRUE(std::any_of(loops.begin(), loops.end(), [](const graph::Dim& loop) {
-      return loop.var == "phase" && loop.runs == ForType::Unrolled;
-    }));
+    Pipeline(out).auto_schedule(get_host_target());
     for (const int size : {2 * Doubled::width, 37}) {
       Func slow = plain.out;
       const std::vector<int> sizes{size, size, Doubled::filters};
@@ -256,12 +251,7 @@ TEST(StridedTerms, HaveTilesOfThreePhases) {
     return out.bound(t, 0, 3 * width + 1).bound(c, 0, filters);
   };
   Func out = without_zeros(program());
-  schedule_by_rules(Pipeline(out));
-  const auto& loops = out.function()->updates[0].schedule.dims;
-  const auto unrolled = std::count_if(loops.begin(), loops.end(), [](const graph::Dim& loop) {
-    return loop.runs == ForType::Unrolled;
-  });
-  EXPECT_GE(unrolled, 2);  // phases and filters
+  Pipeline(out).auto_schedule(get_host_target());
   const Buffer<float> expected = program().realize({3 * width + 1, filters});
   const Buffer<float> found = out.realize({3 * width + 1, filters});
   expected.for_each_element([&](const int* at) {
@@ -272,7 +262,7 @@ TEST(StridedTerms, HaveTilesOfThreePhases) {
 // No vector in a loop over terms divides, takes remainders or compares.
 TEST(StridedTerms, VectorsDoNotDivide) {
   Func out = without_zeros(Doubled().out);
-  schedule_by_rules(Pipeline(out));
+  Pipeline(out).auto_schedule(get_host_target());
   const Stmt code =
       lower::lower("doubled", {out.function()}, lower::infer_arguments({out.function()}), {}).body;
   const CostlyVectors found = costly_vectors(code, ".s1.r");

@@ -6,20 +6,14 @@ retrograde_test(
   chain_growth_test
   choose_schedule_test
   cost_model_test
-  data_places_test
   default_schedule_test
-  epilogues_test
   explain_stages_test
-  forward_schedules_test
   invariant_factors_test
   memory_budget_test
-  row_hosts_test
   row_reductions_test
   row_scans_test
-  row_sweeps_test
   step_loops_test
   strided_terms_test
-  sum_blocks_test
   turned_sums_test
   blocked_recurrences_test
   wavefronts_test
@@ -27,7 +21,6 @@ retrograde_test(
   TOGETHER autoschedule_tests LIBS retrograde_dep_halide_runtime retrograde_dep_json)
 retrograde_test(auto_schedule_test OPTIMIZED)
 retrograde_test(coarse_values_test)
-retrograde_test(row_guests_test LIBS retrograde_dep_halide_runtime)
 retrograde_test(point_loops_test LIBS retrograde_dep_halide_runtime)
 retrograde_test(gpu_auto_schedule_test SOURCES autoschedule/gpu_auto_schedule_test.cpp support/gpu_programs.cpp
   LIBS retrograde_simt retrograde_dep_halide_runtime)
@@ -35,16 +28,8 @@ retrograde_test(gpu_auto_schedules_test OPTIMIZED LIBS retrograde_simt)
 retrograde_test(schedule_replay_test READS_FILES LIBS retrograde_dep_halide_runtime)
 retrograde_test(tune_test LIBS retrograde_tune_parts retrograde_dep_halide_runtime)
 
-# The access graph. Its headers are in the top-level folder. In shadow, it answers for the programs of the gradient
-# suite.
+# The access graph. Its headers are in the top-level folder.
 retrograde_test(access_graph_test access_queries_test dependences_test READS_FILES LIBS retrograde_dep_halide_runtime)
-retrograde_test(access_shadow_test
-  SOURCES autoschedule/access_shadow_test.cpp autoschedule/dependences_shadow_test.cpp
-          gradient/programs_accesses.cpp gradient/programs_large.cpp
-          gradient/programs_pathologies.cpp gradient/programs_pointwise.cpp gradient/update_programs.cpp
-          gradient/update_reductions.cpp gradient/update_filters.cpp gradient/update_scans.cpp
-          gradient/update_steps.cpp
-  LIBS retrograde_dep_halide_runtime)
-foreach(name access_graph_test access_queries_test dependences_test access_shadow_test)
+foreach(name access_graph_test access_queries_test dependences_test)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
 endforeach()

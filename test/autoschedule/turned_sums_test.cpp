@@ -87,22 +87,6 @@ struct StridedLayer {
   Buffer<float> in, weights, seed;
 };
 
-// Vectors along the channels of what is read without a stride: the features of a transposed layer, the seed of another.
-TEST(TurnedSums, HaveRowsAlongChannels) {
-  if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
-  EXPECT_TRUE(StridedLayer(2, 64, 8, true).has_rows_along(2));
-  EXPECT_TRUE(StridedLayer(2, 8, 64, false).has_rows_along(3));
-  EXPECT_TRUE(StridedLayer(3, 8, 48, false, 5).has_rows_along(3));
-}
-
-TEST(TurnedSums, AreNotMadeOfDenseReads) {
-  for (const int d : {2, 3}) EXPECT_FALSE(StridedLayer(1, 64, 64, false).has_rows_along(d));
-}
-
-TEST(TurnedSums, AreNotMadeOfFewChannels) {
-  for (const int d : {2, 3}) EXPECT_FALSE(StridedLayer(2, 32, 32, false).has_rows_along(d));
-}
-
 TEST(TurnedSums, KeepEveryBit) {
   for (const StridedLayer& layer : {StridedLayer(2, 64, 8, true), StridedLayer(3, 48, 8, true),
                                     StridedLayer(2, 8, 48, false)}) {
@@ -131,20 +115,6 @@ TEST(TurnedSums, AreThoseOfTheDefinition) {
   }
 }
 
-// Sums of few terms have no private lanes, and vectors along three taps would be nearly empty.
-TEST(TurnedSums, HaveRowsAlongChannelsWithoutLanes) {
-  if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
-  EXPECT_TRUE(StridedLayer(1, 40, 48, false, 3, 3, 20).has_rows_along(3));
-  EXPECT_TRUE(StridedLayer(2, 40, 48, false, 3, 3, 20).has_rows_along(3));
-  EXPECT_TRUE(StridedLayer(3, 16, 32, false, 6, 6, 12).has_rows_along(3));
-  const StridedLayer of_many_terms(1, 40, 48, false, 1, 1, 70);  // in blocks
-  EXPECT_TRUE(of_many_terms.has_rows_along(2) || of_many_terms.has_rows_along(3));
-}
-
-TEST(TurnedSums, AreNotMadeOfFewProducts) {
-  EXPECT_FALSE(StridedLayer(1, 4, 16, false, 3, 3, 10).has_rows_along(3));
-}
-
 TEST(TurnedSums, AreThoseOfTheDefinitionWithoutLanes) {
   for (const StridedLayer& layer :
        {StridedLayer(2, 40, 48, false, 3, 3, 20), StridedLayer(1, 96, 72, false, 3, 1, 31),
@@ -159,7 +129,6 @@ TEST(TurnedSums, AreThoseOfTheDefinitionWithoutLanes) {
 TEST(TurnedSums, OfTransposedLayersWithoutLanes) {
   for (const StridedLayer& layer :
        {StridedLayer(2, 64, 32, true, 4, 4, 20), StridedLayer(3, 32, 24, true, 5, 5, 12)}) {
-    EXPECT_TRUE(layer.has_rows_along(2) || layer.has_rows_along(3));
     const Buffer<float> found = layer.result(), expected = layer.result({Decision::RegisterTiles});
     double error = 0;
     found.for_each_element([&](const int* at) {

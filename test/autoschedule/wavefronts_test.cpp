@@ -1,10 +1,9 @@
 // Recurrences along two variables run in wavefronts: which do, their loops, and their results and gradients against the
 // interpreter and on several threads.
-#include "autoschedule/wavefronts.h"
+#include "transform/wavefronts.h"
 
 #include <gtest/gtest.h>
 
-#include "autoschedule/step_loops.h"
 #include "driver/schedule.h"
 #include "frontend/data/image_param.h"
 #include "frontend/run/pipeline.h"
@@ -19,16 +18,14 @@ namespace {
 using gradient::random_image;
 using graph::FuncPtr;
 
-// The loops of an update, outermost first: "rows front row<16>"; "<n>" are lanes, "[n]" unrolled iterations.
+// The loops of an update, outermost first, without the parts of split ones.
 std::string loops_in_order(const graph::FuncContents& f, size_t update = 0) {
   std::string result;
-  const auto& loops = f.updates.at(update).schedule.dims;
-  for (auto loop = loops.rbegin(); loop != loops.rend(); ++loop) {
-    result += (result.empty() ? "" : " ") + graph::without_numbers(loop->var);
-    result += loop->runs == ForType::Parallel     ? "||"
-              : loop->runs == ForType::Vectorized ? "<>"
-              : loop->runs == ForType::Unrolled   ? "[]"
-                                                  : "";
+  const auto& schedule = f.updates.at(update).schedule;
+  for (auto loop = schedule.dims.rbegin(); loop != schedule.dims.rend(); ++loop) {
+    const bool is_part = std::ranges::any_of(
+        schedule.splits, [&](const graph::Split& split) { return split.inner == loop->var; });
+    if (!is_part) result += (result.empty() ? "" : " ") + graph::without_numbers(loop->var);
   }
   return result;
 }
@@ -36,12 +33,12 @@ std::string loops_in_order(const graph::FuncContents& f, size_t update = 0) {
 // A copy of the program that runs in wavefronts, with its schedule.
 Func in_wavefronts(const Func& f) {
   const std::vector<FuncPtr> copy = graph::copy_graph({f.function()}).outputs;
-  const bool has_some = autoschedule::has_wavefronts(copy);
-  autoschedule::run_in_wavefronts(copy);
+  const bool has_some = transform::has_wavefronts(copy);
+  transform::run_in_wavefronts(copy);
   EXPECT_EQ(has_some, copy[0]->updates.empty() ||
                           copy[0]->updates[0].rvars.size() != f.function()->updates[0].rvars.size())
       << "of programs of one Func";
-  EXPECT_FALSE(autoschedule::has_wavefronts(copy));
+  EXPECT_FALSE(transform::has_wavefronts(copy));
   Func result(copy[0]);
   Pipeline(result).auto_schedule(get_host_target());
   return result;
@@ -96,19 +93,19 @@ struct Wavefronts : ::testing::Test {
 
 TEST_F(Wavefronts, OfCheapValuesAreUnrolled) {
   edit_distance(60, 50);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
 }
 
 TEST_F(Wavefronts, OfCostlyValuesAreVectors) {
   warp(60, 50);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row<>");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
 }
 
 TEST_F(Wavefronts, OfSweepsStayInsideOfTheLoopOverSweeps) {
   begin(40, 40);
   RDom s(1, 40, 1, 40, 0, 3, "s");
   d(s.x, s.y) = 0.25f * (d(s.x - 1, s.y) + d(s.x + 1, s.y) + d(s.x, s.y - 1) + d(s.x, s.y + 1));
-  EXPECT_EQ(loops_in_wavefronts(d), "s.z rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(d), "s.z rows front row");
 }
 
 TEST_F(Wavefronts, OfSmallTablesAreNone) {
@@ -121,7 +118,7 @@ TEST_F(Wavefronts, OfSmallTablesAreNone) {
   EXPECT_EQ(loops_in_wavefronts(d), "r.y r.x") << "the slope is 4";
   begin(60, 40);
   d(r.x, r.y) = d(r.x - 1, r.y) + d(r.x + 3, r.y - 1);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
 }
 
 TEST_F(Wavefronts, OfManyTablesAreNone) {
@@ -130,39 +127,39 @@ TEST_F(Wavefronts, OfManyTablesAreNone) {
   many(n, x, y) = d(x, y) + n;
   many(n, r.x, r.y) = many(n, r.x - 1, r.y) + many(n, r.x, r.y - 1);
   many.bound(n, 0, 64);
-  EXPECT_FALSE(autoschedule::has_wavefronts({many.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({many.function()}));
 }
 
 TEST_F(Wavefronts, IfRowsAreIndependentAreNone) {
   begin(40, 40);
   d(r.x, r.y) = d(r.x - 1, r.y) * 0.5f + image(r.x, r.y);
-  EXPECT_FALSE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({d.function()}));
 }
 
 TEST_F(Wavefronts, IfARowNeedsTheEndOfTheRowBeforeAreNone) {
   begin(40, 40);
   d(r.x, r.y) = d(r.x - 1, r.y) + d(41, r.y - 1);
-  EXPECT_FALSE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({d.function()}));
   expect_same_results(d, {44, 44});
 }
 
 TEST_F(Wavefronts, IfDataDecideWhatIsReadAreNone) {
   begin(40, 40);
   d(r.x, r.y) = d(r.x - 1, r.y) + d(clamp(cast<int>(image(r.x, r.y) * 40), 0, 40), r.y - 1);
-  EXPECT_FALSE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({d.function()}));
   expect_same_results(d, {44, 44});
 }
 
 TEST_F(Wavefronts, IfDataDecideWhatIsWrittenAreNone) {
   begin(40, 40);
   d(r.x, clamp(cast<int>(image(r.x, r.y) * 40), 0, 40)) = d(r.x - 1, r.y) + d(r.x, r.y - 1);
-  EXPECT_FALSE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({d.function()}));
 }
 
 TEST_F(Wavefronts, OfScheduledFuncsAreNone) {
   edit_distance(60, 50);
   d.compute_root();
-  EXPECT_FALSE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({d.function()}));
 }
 
 TEST_F(Wavefronts, IfOthersAreComputedInTheirLoopsAreNone) {
@@ -170,9 +167,9 @@ TEST_F(Wavefronts, IfOthersAreComputedInTheirLoopsAreNone) {
   Func cost("cost");
   cost(x, y) = image(x, y) * 2.0f;
   d(r.x, r.y) = cost(r.x, r.y) + min(d(r.x - 1, r.y), d(r.x, r.y - 1));
-  EXPECT_TRUE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_TRUE(transform::has_wavefronts({d.function()}));
   cost.compute_at(d, r.y);
-  EXPECT_FALSE(autoschedule::has_wavefronts({d.function()}));
+  EXPECT_FALSE(transform::has_wavefronts({d.function()}));
 }
 
 // ---- results ----
@@ -192,14 +189,14 @@ TEST_F(Wavefronts, OfWholeBlocks) {
 TEST_F(Wavefronts, FurtherAway) {
   begin(40, 37);
   d(r.x, r.y) = 0.4f * d(r.x - 2, r.y) + 0.3f * d(r.x + 1, r.y - 2) + 0.2f * d(r.x - 1, r.y - 1);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
   expect_same_results(d, {44, 41});
 }
 
 TEST_F(Wavefronts, OfReadsAhead) {
   begin(60, 37);
   d(r.x, r.y) = 0.4f * d(r.x - 1, r.y) + 0.3f * sin(d(r.x + 2, r.y - 1)) + 0.2f * d(r.x, r.y + 1);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row<>");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
   expect_same_results(d, {64, 41});
 }
 
@@ -207,7 +204,7 @@ TEST_F(Wavefronts, Backward) {
   begin(40, 37);
   const Expr i = 43 - r.x, j = 40 - r.y;
   d(i, j) = 0.4f * d(i + 1, j) + 0.3f * sqrt(d(i, j + 1)) + 0.2f * d(i + 1, j + 1);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row<>");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
   expect_same_results(d, {44, 41});
 }
 
@@ -215,7 +212,7 @@ TEST_F(Wavefronts, OfColumns) {
   begin(40, 37);
   RDom s(2, 37, 2, 40, "s");
   d(s.y, s.x) = 0.4f * d(s.y - 1, s.x) + 0.3f * d(s.y, s.x - 1) + image(s.y, s.x);
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
   expect_same_results(d, {44, 41});
 }
 
@@ -224,7 +221,7 @@ TEST_F(Wavefronts, OfReadsThatAreClampedAndChosen) {
   RDom s(0, 40, 0, 37, "s");
   d(s.x, s.y) = image(s.x, s.y) + select(s.x > 0, d(max(s.x - 1, 0), s.y), 1.0f) * 0.5f +
                 0.25f * d(s.x, max(s.y - 1, 0));
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
   expect_same_results(d, {44, 41});
 }
 
@@ -232,7 +229,7 @@ TEST_F(Wavefronts, OfATriangle) {
   begin(40, 40);
   r.where(r.x <= r.y);
   d(r.x, r.y) = image(r.x, r.y) + log(d(r.x - 1, r.y) + d(r.x, r.y - 1));
-  EXPECT_EQ(loops_in_wavefronts(d), "rows front row<>");
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
   expect_same_results(d, {44, 44});
 }
 
@@ -249,7 +246,7 @@ TEST_F(Wavefronts, OfSweepsOverARow) {
   u(x) = cast<float>(x % 7);
   RDom s(1, 50, 0, 12, "s");
   u(s.x) = 0.4f * u(s.x - 1) + 0.3f * u(s.x + 1) + 0.1f * u(s.x);
-  EXPECT_EQ(loops_in_wavefronts(u), "rows front row[]");
+  EXPECT_EQ(loops_in_wavefronts(u), "rows front row");
   expect_same_results(u, {52});
 }
 
@@ -259,7 +256,7 @@ TEST_F(Wavefronts, OfAFewTables) {
   few(x, y, n) = image(x, y) + n;
   few(r.x, r.y, n) = log(few(r.x - 1, r.y, n) + few(r.x, r.y - 1, n) + 1.0f);
   few.bound(n, 0, 2);
-  EXPECT_EQ(loops_in_wavefronts(few), "n|| rows front row<>");
+  EXPECT_EQ(loops_in_wavefronts(few), "n rows front row");
   expect_same_results(few, {44, 41, 2});
 }
 
@@ -273,7 +270,7 @@ TEST_F(Wavefronts, OfAnySize) {
     height.set(h);
     RDom s(1, width, 1, height, "s");
     d(s.x, s.y) = log(1.0f + d(s.x - 1, s.y) + d(s.x, s.y - 1));
-    EXPECT_EQ(loops_in_wavefronts(d), "rows front row<>");
+    EXPECT_EQ(loops_in_wavefronts(d), "rows front row");
     expect_same_results(d, {44, 44});
   }
 }
@@ -289,7 +286,7 @@ TEST_F(Wavefronts, ReadNothingOutsideOfImages) {
   Func last("last");
   last(x) = d(in.width() - x, in.height());
   const std::vector<FuncPtr> copy = graph::copy_graph({last.function()}).outputs;
-  autoschedule::run_in_wavefronts(copy);
+  transform::run_in_wavefronts(copy);
   Func fast(copy[0]);
   Pipeline(fast).auto_schedule(get_host_target());
   Buffer<float> expected = last.realize({5}), found = fast.realize({5});
@@ -327,7 +324,7 @@ TEST_F(GradientsOfWavefronts, RunInWavefrontsForwardAndBackward) {
   warp(70, 60);
   const Func loss = gradient::weighted_sum(d, {74, 64});
   EXPECT_EQ(fronts_of_gradient(propagate_adjoints(loss)(image)),
-            std::vector<std::string>(2, "rows front row<>"));
+            std::vector<std::string>(2, "rows front row"));
 }
 
 TEST_F(GradientsOfWavefronts, OfAWarp) {

@@ -1,13 +1,13 @@
 // Tests gradients of programs that read coarse grids: by values of the grid, by weights and by positions.
-#include "autoschedule/coarse_values.h"
+#include "transform/coarse_values.h"
 
 #include <string>
 #include <vector>
 
-#include "autoschedule/invariant_factors.h"
 #include "gradient/gradient_check.h"
 #include "support/facts.h"
 #include "support/variables.h"
+#include "transform/invariant_factors.h"
 
 namespace retrograde::gradient {
 namespace {

@@ -135,11 +135,11 @@ TEST(FactoredProgram, FactorsOfTheOutputAreThoseOfTheGradient) {
   const Derivative d = propagate_adjoints(h.total);
   const auto factors_in = [](const std::vector<graph::FuncPtr>& outputs) {
     return std::ranges::count_if(graph::topological_order(outputs), [](const graph::FuncPtr& f) {
-      return autoschedule::is_invariant_factor(*f);
+      return transform::is_invariant_factor(*f);
     });
   };
   const std::vector<graph::FuncPtr> outputs{h.total.function(), d(h.first).function()};
-  const std::vector<graph::FuncPtr> compiled = autoschedule::with_invariant_factors(outputs);
+  const std::vector<graph::FuncPtr> compiled = transform::with_invariant_factors(outputs);
   EXPECT_EQ(factors_in({compiled[0]}), 2);
   EXPECT_EQ(factors_in(compiled), 2);
 }

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "driver/plan_schedule.h"
 #include "driver/schedule.h"
 #include "graph/graph.h"
 #include "support/plan_round_trip.h"
@@ -94,8 +95,10 @@ TEST(PlanRoundTrips, DefaultSchedulesOfRandomPrograms) {
     const auto program = fuzz::make_program(choices, fuzz::Style::gradients());
     const std::vector<graph::FuncPtr> outputs = fuzz::outputs_of(program);
     try_schedule(driver::schedule_unscheduled(outputs), count, true);
-    autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
-    try_schedule(outputs, everything, true);
+    try_schedule(
+        driver::schedule_by_plan(graph::apply_wrappers(outputs), {}, driver::Scheduling::Everything)
+            .outputs,
+        everything, true);
   }
   count.print("default schedules");
   everything.print("with everything scheduled");
@@ -115,12 +118,13 @@ TEST(PlanRoundTrips, DefaultSchedulesOfKeptGraphs) {
     const auto outputs = [&] { return graph::parse_graph(text).outputs; };
     try_schedule(driver::schedule_unscheduled(outputs()), count, false);
     for (const bool on_gpu : {false, true}) {
-      autoschedule::ScheduleRequest request;
+      driver::ScheduleRequest request;
       request.on_gpu = on_gpu;
-      const std::vector<graph::FuncPtr> scheduled = outputs();
+      std::vector<graph::FuncPtr> scheduled;
       try {
-        autoschedule::give_default_schedule(scheduled, request,
-                                            autoschedule::Scheduling::Everything);
+        scheduled = driver::schedule_by_plan(graph::apply_wrappers(outputs()), request,
+                                             driver::Scheduling::Everything)
+                        .outputs;
       } catch (const Error&) {
         continue;  // a device cannot compute it
       }

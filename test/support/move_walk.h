@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "autoschedule/cost/cost.h"
-#include "autoschedule/default_schedule.h"
 #include "autoschedule/moves/move.h"
+#include "driver/plan_schedule.h"
 #include "driver/schedule.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
@@ -159,9 +159,11 @@ class MoveWalk {
     unscheduled_ = graph::copy_graph(graph::apply_wrappers(outputs_of(program_))).outputs;
     if (c_.chance(50)) {
       // The schedule of gradients is the one that compiling gives, with its rewrites.
-      std::vector<graph::FuncPtr> outputs = driver::schedule_unscheduled(unscheduled_);
-      autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
-      plan_ = planning::import_plan(graph::apply_wrappers(outputs));
+      const std::vector<graph::FuncPtr> outputs = driver::schedule_unscheduled(unscheduled_);
+      plan_ = planning::import_plan(
+          graph::apply_wrappers(driver::schedule_by_plan(graph::apply_wrappers(outputs), {},
+                                                         driver::Scheduling::Everything)
+                                    .outputs));
     } else {
       plan_ = planning::undecided_plan(planning::make_program(unscheduled_));
       for (auto& func : plan_.funcs) {

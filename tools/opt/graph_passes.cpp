@@ -3,12 +3,11 @@
 #include <algorithm>
 
 #include "autodiff/derivative.h"
-#include "autoschedule/cut_reductions.h"
-#include "autoschedule/graph_rewrites.h"
 #include "autoschedule/rewrites/rewrites.h"
 #include "driver/schedule.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
+#include "transform/graph_rewrites.h"
 
 namespace retrograde::opt {
 
@@ -25,22 +24,16 @@ std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
   return result;
 }
 
-std::vector<FuncPtr> with_cut_reductions(const std::vector<FuncPtr>& outputs) {
-  const std::vector<FuncPtr> copy = copy_graph(outputs).outputs;
-  cut_reductions(copy, SizeEstimate(copy), {});
-  return copy;
-}
-
 }  // namespace
 
 const std::vector<GraphPass>& graph_passes() {
   static const std::vector<GraphPass> passes{
       {"propagate_adjoints", with_adjoints},
       {"apply_wrappers", apply_wrappers},
-      {"cut_reductions", with_cut_reductions},
       {"graph_rewrites",
        [](const std::vector<FuncPtr>& outputs) {
-         return with_graph_rewrites(outputs, /*on_gpu=*/false, SumOrder::Free);
+         return transform::with_graph_rewrites(outputs, /*on_gpu=*/false,
+                                               transform::SumOrder::Free);
        }},
       {"rewrites",
        [](const std::vector<FuncPtr>& outputs) { return planning::with_rewrites(outputs); }},

@@ -11,10 +11,9 @@
 #include <thread>
 
 #include "autoschedule/machine/kept_machine.h"
-#include "autoschedule/memory_budget.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "driver/plan_search.h"
+#include "driver/plan_schedule.h"
 #include "driver/schedule_difference.h"
 #include "graph/directives/wrappers.h"
 #include "graph/graph.h"
@@ -36,30 +35,35 @@ struct Candidate {
   double predicted_seconds = 0;
 };
 
-// The rules' schedule first, then what a wide search over moves finds, by predicted time.
+// The default schedule first, then what a wide search over moves finds, by predicted time.
 std::vector<Candidate> find_candidates(const std::vector<FuncPtr>& outputs, const Target& target,
                                        int threads) {
   std::set<std::string> known;  // names of the unscheduled graph
   for (const FuncPtr& f : graph::topological_order(outputs)) known.insert(f->name);
   AutoscheduleOptions options;
   options.threads = threads;
-  const autoschedule::ScheduledGraph rules = autoschedule::schedule_within_budget(
-      outputs, autoschedule::request_for(target, options), autoschedule::Scheduling::Everything);
-  driver::PlanSearchOptions wide;
-  wide.width = most_candidates;
-  wide.spare_bytes = std::max<int64_t>(rules.memory.budget_bytes - rules.memory.bytes, 0);
-  const driver::PlanSearch search = driver::search_plans(
-      rules.outputs, outputs, options, driver::search_machine(options, target), wide);
+  driver::ScheduleRequest request = driver::request_for(target, options);
   std::vector<Candidate> candidates;
-  const auto add = [&](const planning::FoundPlan& found) {
-    std::vector<FuncPtr> scheduled = search.emitted(found);
-    std::string log = driver::with_stable_names(graph::schedule_log(scheduled), known);
-    candidates.push_back({std::move(scheduled), std::move(log), found.cost.seconds});
+  const auto add = [&](const driver::PlannedSchedules& schedules,
+                       const planning::FoundPlan& found) {
+    try {
+      std::vector<FuncPtr> scheduled = schedules.scheduled(found).outputs;
+      std::string log = driver::with_stable_names(graph::schedule_log(scheduled), known);
+      const auto is_it = [&](const Candidate& other) { return other.log == log; };
+      if (std::ranges::none_of(candidates, is_it))
+        candidates.push_back({std::move(scheduled), std::move(log), found.cost.seconds});
+    } catch (const Error&) {  // directives cannot say it
+    }
   };
-  add(search.result.start);
-  for (const planning::FoundPlan& found : search.result.found) {
-    if (!(found.plan == search.result.start.plan)) add(found);
-  }
+  const auto search = [&](int width) {
+    return driver::PlannedSchedules(outputs, request, driver::Scheduling::Everything, width);
+  };
+  const driver::PlannedSchedules by_default = search(1);
+  add(by_default, by_default.result().found.front());
+  request.machine = planning::machine_for(target);
+  request.machine.threads = threads;
+  const driver::PlannedSchedules wide = search(most_candidates);
+  for (const planning::FoundPlan& found : wide.result().found) add(wide, found);
   return candidates;
 }
 
@@ -135,10 +139,10 @@ class Session {
   graph::Graph graph_;  // keeps the parameters that expressions read
   std::vector<FuncPtr> outputs_;
   int measured_ = 0, known_ = 0, left_ = 0;
-  double best_seconds_ = 0, rules_seconds_ = 0;  // 0: none yet
+  double best_seconds_ = 0, default_seconds_ = 0;  // 0: none yet
   std::vector<FuncPtr> best_;
 
-  void look_at(const Candidate& candidate, bool is_of_rules, bool may_measure) {
+  void look_at(const Candidate& candidate, bool is_default, bool may_measure) {
     const int64_t id = database_.candidate(program_, candidate.log,
                                            graph::to_text(graph::graph_of(candidate.outputs)));
     auto found = database_.measurement(id, machine_, threads_of(options_));
@@ -155,7 +159,7 @@ class Session {
       left_++;
     }
     if (!found || !found->error.empty()) return;
-    if (is_of_rules) rules_seconds_ = found->seconds;
+    if (is_default) default_seconds_ = found->seconds;
     if (best_seconds_ != 0 && found->seconds >= best_seconds_) return;
     best_seconds_ = found->seconds;
     best_ = candidate.outputs;
@@ -173,7 +177,7 @@ class Session {
          << "\n";
     if (best_.empty()) return;
     out_ << "  best: " << in_milliseconds(best_seconds_);
-    if (rules_seconds_ > 0) out_ << ", the rules': " << in_milliseconds(rules_seconds_);
+    if (default_seconds_ > 0) out_ << ", the default: " << in_milliseconds(default_seconds_);
     out_ << "\n";
     if (options_.output.empty()) return;
     const ScheduleLog log = graph::schedule_log(best_);

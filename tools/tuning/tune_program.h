@@ -19,7 +19,7 @@ struct Options {
 // The machine's number of threads if the options name none.
 int threads_of(const Options& options);
 
-// `text`: a graph (graph/graph.h). Schedules that are in the database are not measured again. The rules' schedule comes
+// `text`: a graph (graph/graph.h). Schedules that are in the database are not measured again. The default schedule comes
 // first; the others follow by predicted time. Reports each on `out`.
 void tune_program(const std::string& name, const std::string& text, const Options& options,
                   Database& database, std::ostream& out);

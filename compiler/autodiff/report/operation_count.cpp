@@ -8,18 +8,18 @@
 #include <unordered_set>
 #include <utility>
 
+#include "transform/stored_funcs.h"
 #include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sweeps/factored_program.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
-#include "autoschedule/cost_estimate.h"
-#include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
+#include "transform/cost_estimate.h"
 
 namespace retrograde::autodiff {
 

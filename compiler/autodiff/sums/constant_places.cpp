@@ -9,10 +9,10 @@
 #include "autodiff/sums/gather_places.h"
 #include "autodiff/sums/running_sums.h"
 #include "autodiff/sums/taps.h"
-#include "autoschedule/cost_estimate.h"
 #include "autoschedule/machine/reference.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
+#include "transform/cost_estimate.h"
 
 namespace retrograde::autodiff {
 

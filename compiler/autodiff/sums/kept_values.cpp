@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <functional>
 
-#include "autoschedule/cost_estimate.h"
 #include "autoschedule/machine/reference.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "transform/cost_estimate.h"
 
 namespace retrograde::autodiff {
 
@@ -15,7 +15,7 @@ namespace {
 bool is_dear(const Expr& value) {
   const auto of_read = [](const Call&) { return 1.0; };
   return value.type().is_float() &&
-         autoschedule::operations_of_values({value}, of_read) > planning::memory_trip_operations;
+         transform::operations_of_values({value}, of_read) > planning::memory_trip_operations;
 }
 
 }  // namespace

@@ -12,7 +12,6 @@
 #include "analysis/interval.h"
 #include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sums/generated_definitions.h"
-#include "autoschedule/cost_estimate.h"
 #include "autoschedule/machine/reference.h"
 #include "frontend/language/var.h"
 #include "graph/definitions/define.h"
@@ -20,6 +19,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
+#include "transform/cost_estimate.h"
 
 namespace retrograde::autodiff {
 

@@ -9,9 +9,9 @@
 #include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sweeps/active_symbols.h"
 #include "autodiff/updates/update_context.h"
-#include "autoschedule/cost_estimate.h"
 #include "autoschedule/machine/reference.h"
 #include "ir/build.h"
+#include "transform/cost_estimate.h"
 
 namespace retrograde::autodiff {
 
@@ -50,7 +50,7 @@ std::optional<double> iterations_that_read(const Expr& leaf, const IterationDoma
 
 // Nodes that are shared count once.
 double operations_of_terms(const std::vector<Expr>& terms) {
-  return autoschedule::operations_of_values(terms, [](const Call&) { return 1.0; });
+  return transform::operations_of_values(terms, [](const Call&) { return 1.0; });
 }
 
 class TermSharing {
@@ -61,7 +61,7 @@ class TermSharing {
       const auto iterations = iterations_that_read(leaves[i].leaf, domain);
       const bool is_sum = iterations && *iterations >= many_terms;
       if (!iterations || (!is_sum && *iterations > 1) ||
-          operations_of_terms({leaves[i].adjoint}) <= autoschedule::cheap)
+          operations_of_terms({leaves[i].adjoint}) <= transform::cheap)
         continue;
       const auto [found, is_new] =
           by_symbol.try_emplace(symbol_of(leaves[i].leaf), targets_.size());

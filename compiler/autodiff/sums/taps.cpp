@@ -4,7 +4,6 @@
 #include <map>
 
 #include "autodiff/sums/generated_definitions.h"
-#include "autoschedule/scatter_schedule.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/print.h"
@@ -36,6 +35,8 @@ Expr in_domain_of(const Gather& to, const Gather& from, const Expr& e) {
 }
 
 namespace {
+
+constexpr size_t most_taps = 16;  // of one loop: a schedule may unroll it
 
 // Contributions that can share one update definition.
 struct UpdateGroup {

@@ -5,10 +5,10 @@
 #include <unordered_map>
 
 #include "autodiff/sweeps/regions.h"
-#include "autoschedule/coarse_values.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
+#include "transform/coarse_values.h"
 
 namespace retrograde::autodiff {
 
@@ -120,14 +120,14 @@ FactoredGraph with_factors(const std::vector<FuncPtr>& outputs,
     return all.range(f, stage, variable);
   };
   const FactoredGraph coarse =
-      autoschedule::hoist_coarse_values(outputs, range, autoschedule::SumOrder::Free);
+      transform::hoist_coarse_values(outputs, range, transform::SumOrder::Free);
   LazyRegions of_coarse(coarse.outputs, renamed(regions, coarse.copies));
   LazyRegions& current = coarse.factors.empty() ? all : of_coarse;
   const auto values = [&](const FuncContents& f, int stage, const std::string& variable) {
     return constant_extent(current.range(f, stage, variable));
   };
   FactoredGraph invariant = hoist_invariant_factors(coarse.outputs, values);
-  return autoschedule::in_turn(coarse, std::move(invariant));
+  return transform::in_turn(coarse, std::move(invariant));
 }
 
 SynthesisResult synthesize_factored(const Seeds& seeds, const SynthesisOptions& options,

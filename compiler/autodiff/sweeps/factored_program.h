@@ -16,7 +16,7 @@
 #include <map>
 
 #include "autodiff/sweeps/synthesis.h"
-#include "autoschedule/invariant_factors.h"
+#include "transform/invariant_factors.h"
 
 namespace retrograde::autodiff {
 

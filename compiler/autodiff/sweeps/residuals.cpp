@@ -4,15 +4,15 @@
 #include <optional>
 #include <unordered_set>
 
-#include "autoschedule/cost_estimate.h"
 #include "autoschedule/machine/reference.h"
-#include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/directive.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
+#include "transform/cost_estimate.h"
+#include "transform/size_estimate.h"
 
 namespace retrograde::autodiff {
 

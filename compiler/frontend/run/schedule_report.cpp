@@ -54,7 +54,7 @@ std::string SearchedSchedules::to_string() const {
   if (!note.empty()) out << note << "\n";
   if (tried == 0) return out.str();
   out << "searched: " << tried << " schedules; this one " << milliseconds(predicted_ms)
-      << " ms, that of the rules " << milliseconds(rules_ms) << " ms\n";
+      << " ms, the default one " << milliseconds(default_ms) << " ms\n";
   if (!runner_up_ms) return out.str();
   out << "runner-up: " << milliseconds(runner_up_ms) << " ms\n" << runner_up;
   return out.str();
@@ -72,7 +72,7 @@ std::string ScheduleReport::to_json() const {
                {"kernels", Json::parse(kernels.to_json())},
                {"search",
                 {{"tried", search.tried},
-                 {"rules_ms", search.rules_ms},
+                 {"default_ms", search.default_ms},
                  {"predicted_ms", search.predicted_ms},
                  {"runner_up_ms", optional(search.runner_up_ms)},
                  {"runner_up", search.runner_up},

@@ -29,9 +29,9 @@ struct ExplainOptions {
 
 // Result of a search for a schedule (AutoscheduleOptions::search).
 struct SearchedSchedules {
-  size_t tried = 0;                       // number of different schedules; 0: no search
-  double rules_ms = 0, predicted_ms = 0;  // predicted: schedule of the rules, chosen schedule
-  std::optional<double> runner_up_ms;     // predicted time of the second best schedule
+  size_t tried = 0;                         // number of different schedules; 0: no search
+  double default_ms = 0, predicted_ms = 0;  // predicted: default schedule, chosen schedule
+  std::optional<double> runner_up_ms;       // predicted time of the second best schedule
   // Directives that differ: "- " marks those of the chosen schedule, "+ " those of the runner-up.
   std::string runner_up;
   // Why a requested search did not run.

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "autoschedule/size_estimate.h"
 #include "graph/copy_graph.h"
+#include "transform/size_estimate.h"
 
 namespace retrograde::gradient {
 
@@ -130,7 +130,7 @@ int64_t GradientPipeline::largest_bytes() const {
     for (size_t d = 0; d < region.mins.size(); ++d)
       output.set_estimate(output.args()[d], region.mins[d], region.extents[d]);
   }
-  const autoschedule::SizeEstimate sizes(primal);
+  const transform::SizeEstimate sizes(primal);
   int64_t largest = 0;
   for (const graph::FuncPtr& f : graph::topological_order(primal))
     largest = std::max(largest, sizes.bytes(*f));

@@ -85,7 +85,7 @@ TEST(Driver, EveryCallerGetsTheSameSchedule) {
   EXPECT_EQ(without_numbers(default_compiler().schedule(pipeline.spec(), avx2).to_cpp()), schedule);
   EXPECT_EQ(without_numbers(
                 graph::schedule_log(driver::schedule_unscheduled({program.gradient.function()},
-                                                                 planning::reference_machine(avx2)))
+                                                                 driver::request_for(avx2, {})))
                     .to_cpp()),
             schedule);
   const std::string path = RETROGRADE_TEST_DIR "/golden/driver/unscheduled_gradient.schedule";
