@@ -26,6 +26,7 @@ class CallMemory {
   CallMemory(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request)
       : accesses_(outputs), sizes_(accesses_, {planning::unknown_extent}), request_(request) {}
 
+  planning::AccessGraph take_accesses() && { return std::move(accesses_); }
   double callers_bytes() const {
     double result = 0;
     for (size_t i = 0; i < accesses_.images().size(); ++i) {
@@ -52,7 +53,7 @@ class CallMemory {
   }
 
  private:
-  const planning::AccessGraph accesses_;
+  planning::AccessGraph accesses_;
   const planning::SizeModel sizes_;
   const ScheduleRequest& request_;
 
@@ -96,16 +97,18 @@ ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const Sched
   const bool adds_at_places = request.makes(Decision::ScatterStrategy);
   rewrites.for_device = {device, rewrites.splits_sums, adds_at_places, atomics_of(options)};
   rewrites.kept = kept_names(outputs, options, what);
-  const CallMemory memory(outputs, request);
+  CallMemory memory(outputs, request);
   const double callers = memory.callers_bytes(), budget = memory.budget();
+  planning::AccessGraph accesses = std::move(memory).take_accesses();
   PlanSearchOptions search;
   search.start = SearchStart::Nothing;
   search.spare_bytes = static_cast<int64_t>(std::max(budget - callers, 0.0));
   search.must_fit = options.memory_budget > 0;
   search.what = what;
   search.device = device;
-  const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites);
+  const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites, accesses);
   compute_extern_stages_at_root(rewritten);
+  search.accesses = &accesses;
   const PlanSearch found = search_plans(rewritten, outputs, options, request.machine, search);
   const auto scheduled = [&](const planning::FoundPlan& plan) {
     const auto bytes = static_cast<int64_t>(callers + plan.cost.peak_bytes);

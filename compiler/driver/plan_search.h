@@ -38,8 +38,9 @@ struct PlanSearchOptions {
   int64_t spare_bytes = 0;
   bool must_fit = false;  // without rules: however slow the program gets
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
-  std::set<std::string> without;             // moves that are not made
-  const planning::Device* device = nullptr;  // that runs the program; null: the processor does
+  std::set<std::string> without;              // moves that are not made
+  planning::AccessGraph* accesses = nullptr;  // of a program like this one, which is taken
+  const planning::Device* device = nullptr;   // that runs the program; null: the processor does
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.
