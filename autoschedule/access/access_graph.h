@@ -14,7 +14,7 @@
 //       write bins(v1)      v1(r.x) = hist(r.x): data decide the place, r.x moves it
 //
 // The graph is built once from the outputs of a program and never changes. Building it visits each node of the
-// definitions once. It depends on definitions alone, not on directives, except that wrappers are Funcs like others.
+// definitions once, except those that are equal to ones of an earlier graph. It depends on definitions alone, not on directives, except that wrappers are Funcs like others.
 #pragma once
 
 #include <cstdint>
@@ -97,7 +97,8 @@ struct StageNode {
   std::vector<Access> reads;  // in the order of the expressions; equal ones once
   Guard guard;                // the predicate
   std::vector<OperationCount> operations;
-  bool needs_host = false;  // it calls what no kernel can: C functions, print, traced loads
+  std::vector<Expr> definition;  // what it was read from: coordinates, values and predicate
+  bool needs_host = false;       // it calls what no kernel can: C functions, print, traced loads
 };
 
 struct FuncNode {
@@ -108,7 +109,10 @@ struct FuncNode {
 
 class AccessGraph {
  public:
-  explicit AccessGraph(const std::vector<FuncPtr>& outputs);
+  AccessGraph() = default;
+  // `before`: a graph of a program of which most stages have the same names and definitions, or none. They are not read again.
+  AccessGraph(const std::vector<FuncPtr>& outputs, AccessGraph before);
+  explicit AccessGraph(const std::vector<FuncPtr>& outputs) : AccessGraph(outputs, AccessGraph()) {}
 
   const std::vector<FuncNode>& funcs() const { return funcs_; }
   const FuncNode& func(FuncId id) const { return funcs_[static_cast<size_t>(id)]; }
@@ -118,6 +122,7 @@ class AccessGraph {
   const std::vector<std::shared_ptr<ParameterContents>>& images() const { return images_; }
   // -1: it is none of the graph.
   FuncId find(const Symbol* func) const;
+  FuncId find(const std::string& func) const;
   ImageId find_image(const Symbol* image) const;
   // The stages of other Funcs that read it, each once.
   const std::vector<StageId>& consumers(FuncId id) const {
@@ -132,10 +137,14 @@ class AccessGraph {
   std::vector<FuncNode> funcs_;
   std::vector<std::shared_ptr<ParameterContents>> images_;
   std::unordered_map<const Symbol*, FuncId> ids_;
+  std::unordered_map<std::string, FuncId> ids_by_name_;
   std::unordered_map<const Symbol*, ImageId> image_ids_;
   std::vector<std::vector<StageId>> consumers_;
   ValueNumbers numbers_;
   size_t nodes_visited_ = 0;
+
+  StageNode read_stage(StageId id, AccessGraph& before);
+  bool renumber(StageNode& stage, StageId id, const AccessGraph& before) const;
 };
 
 std::string print(const AccessGraph& graph);

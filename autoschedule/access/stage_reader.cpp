@@ -11,8 +11,6 @@
 
 namespace retrograde::planning {
 
-namespace {
-
 std::vector<Iterator> iterators_of(const FuncContents& f, const Definition& definition) {
   std::vector<Iterator> result;
   for (size_t d = 0; d < f.args.size(); ++d) {
@@ -23,6 +21,15 @@ std::vector<Iterator> iterators_of(const FuncContents& f, const Definition& defi
     result.push_back({r.var, Iterator::Kind::Reduction, -1, r.min, r.extent});
   return result;
 }
+
+std::vector<Expr> expressions_of(const Definition& definition) {
+  std::vector<Expr> result = definition.args;
+  ir::append(result, definition.values);
+  result.push_back(definition.predicate);
+  return result;
+}
+
+namespace {
 
 bool is_comparison(Kind kind) { return kind >= Kind::EQ && kind <= Kind::GE; }
 
@@ -55,8 +62,7 @@ bool is_about_border(const Expr& e) {
 
 }  // namespace
 
-StageReader::StageReader(const Names& names, ValueNumbers& numbers, const FuncContents& f,
-                         StageId id)
+StageReader::StageReader(Names names, ValueNumbers& numbers, const FuncContents& f, StageId id)
     : names_(names),
       numbers_(numbers),
       f_(f),
@@ -85,6 +91,7 @@ StageNode StageReader::read() {
                         [&](const Call& call, const Guard& guard) { read_call(call, guard); });
   node.reads = std::move(reads_);
   node.needs_host = needs_host_;
+  node.definition = expressions_of(definition_);
   if (f_.is_extern()) read_extern(node);
   count_operations(node);
   node.iterators = std::move(iterators_);

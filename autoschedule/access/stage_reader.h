@@ -14,14 +14,14 @@ namespace retrograde::planning {
 
 // The Funcs and images of a graph.
 struct Names {
-  std::unordered_map<const Symbol*, FuncId> funcs;
-  std::unordered_map<const Symbol*, ImageId> images;
+  const std::unordered_map<const Symbol*, FuncId>& funcs;
+  const std::unordered_map<const Symbol*, ImageId>& images;
 };
 
 // The values and index forms of a stage's expressions, which contain no lets.
 class StageValues {
  public:
-  StageValues(const Names& names, ValueNumbers& numbers, const std::vector<Iterator>& iterators);
+  StageValues(Names names, ValueNumbers& numbers, const std::vector<Iterator>& iterators);
 
   Value value(const Expr& e);
   // The same, with the clamps of indices stripped: adjoints clamp what the primal doesn't.
@@ -44,7 +44,7 @@ class StageValues {
   IndexForm opaque(const Expr& e);
   IndexForm clamped(IndexForm form, const Expr& clamp);
 
-  const Names& names_;
+  const Names names_;
   ValueNumbers& numbers_;
   std::unordered_map<std::string, int> iterators_;
   analysis::Scope<Interval> scope_;
@@ -56,7 +56,7 @@ class StageValues {
 
 class StageReader {
  public:
-  StageReader(const Names& names, ValueNumbers& numbers, const FuncContents& f, StageId id);
+  StageReader(Names names, ValueNumbers& numbers, const FuncContents& f, StageId id);
   StageNode read();
   size_t nodes_visited() const { return values_.nodes_visited() + nodes_; }
 
@@ -70,7 +70,7 @@ class StageReader {
   std::vector<IndexForm> indices(const std::vector<Expr>& args);
   Value place_of(const std::vector<IndexForm>& index);
 
-  const Names& names_;
+  const Names names_;
   ValueNumbers& numbers_;
   const FuncContents& f_;
   const Definition& definition_;
@@ -86,6 +86,9 @@ class StageReader {
   size_t nodes_ = 0;
 };
 
+// The loops and the expressions of a definition.
+std::vector<Iterator> iterators_of(const FuncContents& f, const Definition& definition);
+std::vector<Expr> expressions_of(const Definition& definition);
 // Whether the arm of a select, or the operand of a minimum or maximum, is the one inside of the border.
 bool is_likely(const Expr& e);
 

@@ -43,8 +43,7 @@ bool is_likely(const Expr& e) {
   return is_likely(binary->a) || is_likely(binary->b);
 }
 
-StageValues::StageValues(const Names& names, ValueNumbers& numbers,
-                         const std::vector<Iterator>& iterators)
+StageValues::StageValues(Names names, ValueNumbers& numbers, const std::vector<Iterator>& iterators)
     : names_(names), numbers_(numbers), scope_(scope_of(iterators)), bounds_(scope_, nullptr) {
   for (size_t i = 0; i < iterators.size(); ++i)
     iterators_.emplace(iterators[i].name, static_cast<int>(i));
@@ -98,9 +97,9 @@ Value StageValues::call_value(const Call& call, Part part) {
                            static_cast<uint64_t>(call.component)};
   bool from_data = true;
   if (call.call_type == CallType::Func) {
-    what.push_back(static_cast<uint64_t>(names_.funcs.at(call.symbol.raw())));
+    what.push_back(numbers_.word_of(call.name));  // which later graphs have, too
   } else if (call.call_type == CallType::Image) {
-    what.push_back(static_cast<uint64_t>(names_.images.at(call.symbol.raw())));
+    what.push_back(reinterpret_cast<uint64_t>(call.symbol.raw()));
   } else {
     what.push_back(numbers_.word_of(call.name));
     from_data = call.call_type == CallType::Extern;

@@ -49,6 +49,8 @@ inline constexpr double remainder_overhead = 1.1;
 inline constexpr double largest_vector_body = 600, nodes_of_operation = 2, nodes_of_access = 3;
 // The reads that inlining may give a stage; beyond them its cost is a lower bound.
 inline constexpr size_t most_composed_reads = 2000;
+// Instructions of a loop beside its body: its bounds, and its share of those of buffers.
+inline constexpr double code_of_loop = 20;
 // Two half vectors are widened, and their lanes put in turn.
 inline constexpr double interleave_shuffles = 3;
 // An access beyond this stride is an element at a time.

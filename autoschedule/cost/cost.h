@@ -26,6 +26,7 @@ struct StageCost {
   StageId stage;
   double seconds = 0;  // its share of the call's time
   double compute_seconds = 0, launch_seconds = 0;
+  double code = 0;  // instructions of its code
   // Bytes that each level supplies, and the time that they take. Those of L1 are part of the compute time.
   std::array<double, Machine::level_count> bytes = {}, memory_seconds = {};
   std::string bound_by() const;  // "compute", "L2", "L3", "memory", "launch"
@@ -35,6 +36,7 @@ struct StageCost {
 struct Totals {
   double seconds = 0;
   double peak_bytes = 0;  // alive at once, of what the program itself allocates
+  double code = 0;        // instructions: how long it takes to compile
 };
 struct Cost : Totals {
   std::vector<StageCost> stages;  // of those that have loops, by StageId

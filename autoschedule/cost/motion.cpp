@@ -89,7 +89,7 @@ Motion Motions::of_call(const Call& call, Scope& scope) {
   Motion result{false, std::vector<double>(scope.iterators.size())};
   if (call.call_type == CallType::Operator)
     return call.args.empty() ? result : of(call.args[0], scope);
-  const FuncId func = call.call_type == CallType::Func ? graph_.find(call.symbol.raw()) : -1;
+  const FuncId func = call.call_type == CallType::Func ? graph_.find(call.name) : -1;
   if (func < 0 || graph_.func(func).stages.size() != 1 || graph_.func(func).func->is_extern()) {
     result.is_table = !call.type.is_float();
     return result;

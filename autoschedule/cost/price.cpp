@@ -37,11 +37,13 @@ class CostModel::Prices {
                 accesses.funcs().size() + accesses.images().size()),
         funcs_(accesses.funcs().size()),
         root_bytes_(funcs_.size()),
-        own_bytes_(funcs_.size()) {}
+        own_bytes_(funcs_.size()),
+        code_(funcs_.size()) {}
 
   Totals totals(const Plan& plan) {
     follow(plan);
-    return {supply_.seconds(), peak_bytes(groups_.all(), places_, root_bytes_, own_bytes_)};
+    return {supply_.seconds(), peak_bytes(groups_.all(), places_, root_bytes_, own_bytes_),
+            std::accumulate(code_.begin(), code_.end(), 0.0)};
   }
   Cost price(const Plan& plan) {
     Cost cost{totals(plan), {}};
@@ -69,7 +71,7 @@ class CostModel::Prices {
   ProgramGroups groups_;
   CacheSupply supply_;
   std::vector<RunningFunc> funcs_;
-  std::vector<double> root_bytes_, own_bytes_;  // by Func, and by group
+  std::vector<double> root_bytes_, own_bytes_, code_;  // by Func; by group
 
   void follow(const Plan& plan) {
     std::vector<FuncId> changed;
@@ -87,6 +89,7 @@ class CostModel::Prices {
       const GroupPrice* price = planned.funcs.empty() ? nullptr : &price_of(plan, planned, covers);
       supply_.change(g, price);
       own_bytes_[g] = price ? price->allocated_bytes : 0;
+      code_[g] = price ? price->code : 0;
     }
     supply_.update();
     for (const FuncId f : changed)
@@ -122,6 +125,7 @@ class CostModel::Prices {
     for (const StageRun& run : group.runs)
       price.stages.push_back(on_device ? kernel_cost(run, group, *device_, machine_)
                                        : cost_of(run, group));
+    for (const StageCost& stage : price.stages) price.code += stage.code;
     if (!on_device) {
       price.traffic = traffic_of(group, machine_);
       for (const auto& [buffer, stored] : group.buffers)
@@ -134,7 +138,9 @@ class CostModel::Prices {
     StageCost cost;
     cost.stage = run.id;
     const LoopNode& innermost = group.nodes[static_cast<size_t>(run.path.back())];
-    cost.compute_seconds = work_of(run, group, machine_).all() / innermost.speedup * nanosecond;
+    const UnitTimes work = work_of(run, group, machine_);
+    cost.code = work.code;
+    cost.compute_seconds = work.all() / innermost.speedup * nanosecond;
     if (run.id.stage == 0) cost.compute_seconds += heap_seconds(run, group);
     for (const int n : run.path) {
       const LoopNode& node = group.nodes[static_cast<size_t>(n)];

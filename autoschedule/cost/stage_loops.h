@@ -73,6 +73,13 @@ class StageLoops {
     }
     return result;
   }
+  // The same, of all unrolled loops.
+  double all_copies(IteratorSet depends) const {
+    double result = 1;
+    for (size_t d = 0; d < depth(); ++d)
+      if (kind(d) == ForType::Unrolled && moves(d, depends)) result *= run_.nest.trips[d];
+    return result;
+  }
   double vectors(double element_bytes, IteratorSet depends) const {
     if (!is_vector(depends)) return 1;
     return std::max(1.0, std::ceil(lanes_.count * element_bytes / m_.vector_bytes));

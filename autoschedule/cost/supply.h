@@ -14,6 +14,7 @@ namespace retrograde::planning {
 struct GroupPrice {
   std::vector<StageCost> stages;  // without the memory of the processor
   GroupTraffic traffic;
+  double code = 0;             // of all stages
   double allocated_bytes = 0;  // for Funcs that are computed in its loops
 };
 

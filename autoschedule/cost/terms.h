@@ -19,6 +19,7 @@ struct UnitTimes {
   double meeting = 0;  // additions at places that data decide, if each waited for the one before
   double starts =
       0;  // of slices, whose first loads wait for the stores to them, and of parallel iterations
+  double code = 0;     // instructions, in all unrolled copies: how often they run counts nothing
   double all() const;  // with what they cannot overlap
 };
 // All iterations of a stage on one thread, if all its data are in the first cache.

@@ -78,6 +78,13 @@ double guarded_share(const StageRun& run, const Group& group) {
   return share;
 }
 
+// Whether both move alike, though they end at other borders.
+bool is_alike(Touch a, const Touch& b) {
+  if (a.sides.size() != b.sides.size()) return false;
+  for (size_t d = 0; d < a.sides.size(); ++d) a.sides[d].most = b.sides[d].most;
+  return a == b;
+}
+
 class StageWork : StageLoops {
  public:
   StageWork(const StageRun& run, const Group& group, const Machine& machine)
@@ -118,6 +125,8 @@ class StageWork : StageLoops {
   void add_operation(const OperationRow& row) {
     if (row.decided_by && are_constants(row.decided_by)) return;
     const double shared = row.behind_branch ? copies(row.depends, false) : 1;
+    units_.code +=
+        row.count * all_copies(row.depends) * shared * vectors(row.element_bytes, row.depends);
     const double count = row.count * times(row.depends) * shared;
     instructions_ += count * vectors(row.element_bytes, row.depends);
     if (is_vector(row.depends))
@@ -134,12 +143,6 @@ class StageWork : StageLoops {
       return kind == ForType::Unrolled || kind == ForType::Vectorized;
     };
     return *std::ranges::find_if_not(run.path.rbegin(), run.path.rend(), is_body);
-  }
-  // Whether both move alike, though they end at other borders.
-  static bool is_alike(Touch a, const Touch& b) {
-    if (a.sides.size() != b.sides.size()) return false;
-    for (size_t d = 0; d < a.sides.size(); ++d) a.sides[d].most = b.sides[d].most;
-    return a == b;
   }
   // Whether an earlier stage loads the same in the same iteration of all loops.
   bool is_loaded_before(const Touch& touch) const {
@@ -179,8 +182,10 @@ class StageWork : StageLoops {
         share * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
     (touch.writes ? units : units_.arithmetic) +=
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
-    instructions_ += count * (moved.is_by_lane ? lane_instructions * lanes_.count
-                                               : vectors(touch.element_bytes, touch.moved));
+    const double each = moved.is_by_lane ? lane_instructions * lanes_.count
+                                         : vectors(touch.element_bytes, touch.moved);
+    instructions_ += count * each;
+    units_.code += touch.count * all_copies(touch.moved) * each;
     if (moved.is_by_lane) return;
     if (moved.is_bent) bent_ = std::max(bent_, vectors(touch.element_bytes, touch.moved));
     const double bytes = std::min(double(m_.vector_bytes), lanes_.count * touch.element_bytes);
@@ -312,6 +317,7 @@ class StageWork : StageLoops {
   void add_loops() {
     for (size_t d = 0; d < depth(); ++d) {
       const bool is_own = node(d).loop.stage == run_.id;
+      if (is_own && is_serial(d)) units_.code += code_of_loop;
       if (is_own && is_serial(d)) units_.loops += node(d).times * m_.iteration_ns;
       if (is_own && runs_at_once(kind(d))) units_.starts += node(d).times * task_ns;
     }

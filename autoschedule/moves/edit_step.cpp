@@ -2,22 +2,13 @@
 #include <algorithm>
 
 #include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/readers.h"
 
 namespace retrograde::planning::moves {
 
 namespace {
 
 using Kind = Level::Kind;
-
-// The stage that owns a loop.
-StageId owner_of(const Plan& plan, const LoopRef& loop) {
-  StageId stage = loop.stage;
-  while (const std::optional<LoopRef>& host = plan.nest(stage).shared_with) {
-    if (host->depth < loop.depth) break;
-    stage = host->stage;
-  }
-  return stage;
-}
 
 // The loop that a Func is computed in, perhaps through loops of others, from this loop inwards.
 std::optional<LoopRef> place_inside(const Plan& plan, FuncId guest, const LoopRef& loop) {

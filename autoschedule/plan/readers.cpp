@@ -29,14 +29,13 @@ const LoopRef* shared_with(const Plan& plan, StageId stage) {
   return shared ? &*shared : nullptr;
 }
 
-// The stage that owns a loop.
+}  // namespace
+
 StageId owner_of(const Plan& plan, const LoopRef& loop) {
   const LoopRef* shared = shared_with(plan, loop.stage);
   return shared && loop.depth <= shared->depth ? owner_of(plan, {shared->stage, loop.depth})
                                                : loop.stage;
 }
-
-}  // namespace
 
 std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level) {
   const StageId host = level.loop.stage;

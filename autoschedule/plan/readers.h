@@ -10,6 +10,8 @@ namespace retrograde::planning {
 
 // The stages that read each Func of a program in this order, those of the Func itself excepted.
 std::vector<std::vector<StageId>> readers_of(const std::vector<graph::FuncPtr>& funcs);
+// The stage that owns a loop, which others may share.
+StageId owner_of(const Plan& plan, const LoopRef& loop);
 // The depth of the level's loop in a stage, which may share it; nullopt if it is no loop of the stage. Loops alike of
 // different stages may be at different depths.
 std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level);

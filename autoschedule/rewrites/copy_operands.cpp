@@ -24,8 +24,8 @@ double product_of(const std::vector<int64_t>& extents) {
 
 class OperandCopier {
  public:
-  explicit OperandCopier(const std::vector<graph::FuncPtr>& outputs)
-      : accesses_(outputs), sizes_(accesses_, {unknown_extent}) {
+  explicit OperandCopier(const AccessGraph& accesses)
+      : accesses_(accesses), sizes_(accesses_, {unknown_extent}) {
     for (const FuncNode& node : accesses_.funcs()) {
       for (const StageNode& stage : node.stages) reads_ += reads_of(stage);
     }
@@ -41,7 +41,7 @@ class OperandCopier {
   }
 
  private:
-  const AccessGraph accesses_;
+  const AccessGraph& accesses_;
   const SizeModel sizes_;
   double reads_ = 0;  // of all stages
 
@@ -140,8 +140,10 @@ class OperandCopier {
 }  // namespace
 
 void copy_operands(const std::vector<graph::FuncPtr>& outputs,
-                   ir::FunctionRef<bool(const graph::FuncContents&)> may_change) {
-  OperandCopier(outputs).run(may_change);
+                   ir::FunctionRef<bool(const graph::FuncContents&)> may_change,
+                   AccessGraph& accesses) {
+  accesses = AccessGraph(outputs, std::move(accesses));
+  OperandCopier(accesses).run(may_change);
 }
 
 }  // namespace retrograde::planning

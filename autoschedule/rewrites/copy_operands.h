@@ -10,14 +10,16 @@
 
 #include <vector>
 
-#include "graph/function.h"
+#include "autoschedule/access/access_graph.h"
 #include "ir/visit.h"
 
 namespace retrograde::planning {
 
 // Gives wrappers to Funcs and images of this graph, for consumers that may change, each of its own: where sums of more than
-// a small part of the program's work read each element several times.
+// a small part of the program's work read each element several times. `accesses`: of the program or one like it; afterwards,
+// of the program without copies.
 void copy_operands(const std::vector<graph::FuncPtr>& outputs,
-                   ir::FunctionRef<bool(const graph::FuncContents&)> may_change);
+                   ir::FunctionRef<bool(const graph::FuncContents&)> may_change,
+                   AccessGraph& accesses);
 
 }  // namespace retrograde::planning

@@ -9,7 +9,7 @@
 namespace retrograde::planning {
 
 std::vector<graph::FuncPtr> with_rewrites(const std::vector<graph::FuncPtr>& outputs,
-                                          const RewriteOptions& options) {
+                                          const RewriteOptions& options, AccessGraph& accesses) {
   const std::vector<graph::FuncPtr> result = graph::copy_graph(outputs).outputs;
   const auto may_change = [&](const graph::FuncContents& f) {
     return !f.is_extern() && !graph::has_directives(f) && !options.kept.contains(f.name);
@@ -18,8 +18,8 @@ std::vector<graph::FuncPtr> with_rewrites(const std::vector<graph::FuncPtr>& out
     split_for_device(result, options.for_device, may_change);
     return graph::apply_wrappers(result);
   }
-  if (options.splits_sums) split_sums(result, may_change);
-  if (options.copies_operands) copy_operands(result, may_change);
+  if (options.splits_sums) split_sums(result, may_change, accesses);
+  if (options.copies_operands) copy_operands(result, may_change, accesses);
   return graph::apply_wrappers(result);
 }
 

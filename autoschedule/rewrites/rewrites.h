@@ -31,7 +31,13 @@ struct RewriteOptions {
   SplitForDevice for_device = {};             // what is split instead where a device runs it
 };
 // The outputs of a copy of the program. Requires: wrappers are applied. Funcs with directives keep their definitions.
+// `accesses`: of the program, or of none; afterwards, of one like it.
 std::vector<graph::FuncPtr> with_rewrites(const std::vector<graph::FuncPtr>& outputs,
-                                          const RewriteOptions& options = {});
+                                          const RewriteOptions& options, AccessGraph& accesses);
+inline std::vector<graph::FuncPtr> with_rewrites(const std::vector<graph::FuncPtr>& outputs,
+                                                 const RewriteOptions& options = {}) {
+  AccessGraph none;
+  return with_rewrites(outputs, options, none);
+}
 
 }  // namespace retrograde::planning

@@ -24,8 +24,8 @@ constexpr double additions_to_element = 16;  // of a privatised copy
 
 class SumSplitter {
  public:
-  explicit SumSplitter(const std::vector<FuncPtr>& outputs)
-      : accesses_(outputs), sizes_(accesses_, {unknown_extent}) {}
+  explicit SumSplitter(const AccessGraph& accesses)
+      : accesses_(accesses), sizes_(accesses_, {unknown_extent}) {}
 
   void run(ir::FunctionRef<bool(const graph::FuncContents&)> may_change) const {
     for (const FuncNode& node : accesses_.funcs()) {
@@ -47,7 +47,7 @@ class SumSplitter {
   }
 
  private:
-  const AccessGraph accesses_;
+  const AccessGraph& accesses_;
   const SizeModel sizes_;
 
   static bool takes_any_order(const FuncNode& node, const StageNode& stage) {
@@ -156,8 +156,10 @@ class SumSplitter {
 }  // namespace
 
 void split_sums(const std::vector<graph::FuncPtr>& outputs,
-                ir::FunctionRef<bool(const graph::FuncContents&)> may_change) {
-  SumSplitter(outputs).run(may_change);
+                ir::FunctionRef<bool(const graph::FuncContents&)> may_change,
+                AccessGraph& accesses) {
+  accesses = AccessGraph(outputs, std::move(accesses));
+  SumSplitter(accesses).run(may_change);
 }
 
 }  // namespace retrograde::planning

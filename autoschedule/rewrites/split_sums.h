@@ -15,14 +15,16 @@
 
 #include <vector>
 
-#include "graph/function.h"
+#include "autoschedule/access/access_graph.h"
 #include "ir/visit.h"
 
 namespace retrograde::planning {
 
 // Splits updates of the Funcs of this graph that may change. Adjoints have their own partial sums and blocks, only
-// long adjoint sums to a few elements are split here.
+// long adjoint sums to a few elements are split here. `accesses`: of the program or one like it; afterwards, of the program
+// before its sums were split.
 void split_sums(const std::vector<graph::FuncPtr>& outputs,
-                ir::FunctionRef<bool(const graph::FuncContents&)> may_change);
+                ir::FunctionRef<bool(const graph::FuncContents&)> may_change,
+                AccessGraph& accesses);
 
 }  // namespace retrograde::planning

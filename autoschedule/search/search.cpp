@@ -1,6 +1,7 @@
 #include "autoschedule/search/search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <unordered_set>
 
@@ -21,6 +22,9 @@ constexpr int64_t prices_per_func = 200;  // for each plan of the beam
 constexpr double small_share = 0.01, smallest_share = 0.002;
 // In programs of more Funcs, each has a smaller share: less is worth a visit or a change.
 constexpr double funcs_for_shares = 100;
+// A plan whose code is twice as long has to be faster by this power of 2. Only Funcs with a large share of the code are visited
+// for it, once, when all is as fast as it gets.
+constexpr double code_exponent = 0.05, large_code_share = 0.05;
 double share_in(const AccessGraph& accesses, double share) {
   return share * std::min(1.0, funcs_for_shares / static_cast<double>(accesses.funcs().size()));
 }
@@ -37,10 +41,19 @@ struct State {
   std::shared_ptr<const Step> last;
 };
 
-bool is_faster(const State& a, const State& b) { return a.cost.seconds < b.cost.seconds; }
+// Seconds, or these weighed with the time that compiling takes.
+enum class Goal : uint8_t { Time, TimeAndCode };
+double score_of(const Totals& cost, Goal goal) {
+  const double weight = goal == Goal::Time ? 1 : std::pow(std::max(cost.code, 1.0), code_exponent);
+  return cost.seconds * weight;
+}
+void sort_by(Goal goal, auto& states) {
+  std::ranges::stable_sort(states, {},
+                           [&](const State& state) { return score_of(state.cost, goal); });
+}
 
 // Whether the gain exceeds the error of the model, which is about the stages whose times differ.
-bool is_worth_it(const Cost& before, const Cost& after, double least_gain,
+bool is_worth_it(const Cost& before, const Cost& after, Goal goal, double least_gain,
                  double least_gain_of_all) {
   double changed = 0;
   auto was = before.stages.begin();
@@ -52,7 +65,7 @@ bool is_worth_it(const Cost& before, const Cost& after, double least_gain,
   }
   for (; was != before.stages.end(); ++was) changed += was->seconds;
   const double least = std::max(least_gain * changed, least_gain_of_all * before.seconds);
-  return after.seconds < before.seconds - least;
+  return score_of(after, goal) < score_of(before, goal) * (1 - least / before.seconds);
 }
 
 bool is_alike(const FuncPlan& a, const FuncPlan& b) {
@@ -92,16 +105,18 @@ class Beam {
       }
       if (states_[0].cost.seconds > worth_another_sweep * before) break;
     }
+    if (!context_.device) shorten_code();
     return states_;
   }
-  int64_t priced() const { return static_cast<int64_t>(seen_.size()); }
+  int64_t priced() const { return priced_; }
 
  private:
+  Goal goal_ = Goal::Time;
   const Context& context_;
   CostModel& cost_;
   const SearchOptions& options_;
   const size_t width_;
-  int64_t left_;
+  int64_t left_, priced_ = 1;
   std::unordered_set<uint64_t> seen_;
   std::vector<State> states_;  // the fastest first; never empty
 
@@ -129,6 +144,22 @@ class Beam {
            share_of(f) >= share_in(context_.accesses, smallest_share) * states_[0].cost.seconds;
   }
 
+  // Smaller bodies and fewer copies, which were not worth their time before.
+  void shorten_code() {
+    goal_ = Goal::TimeAndCode;
+    seen_.clear();
+    sort_by(goal_, states_);
+    for (auto f = static_cast<FuncId>(context_.accesses.funcs().size()); f-- > 0;) {
+      if (is_worth_visiting(f) && code_of(f) > large_code_share * states_[0].cost.code) visit(f);
+    }
+  }
+  double code_of(FuncId f) const {
+    double code = 0;
+    for (const StageCost& stage : states_[0].cost.stages)
+      if (stage.stage.func == f) code += stage.code;
+    return code;
+  }
+
   // A plan on the way from one of the states.
   struct Candidate : State {
     size_t from = 0;
@@ -142,18 +173,18 @@ class Beam {
     for (int depth = 0; depth < most && !front.empty() && left_ > 0; ++depth) {
       std::vector<Candidate> next;
       for (const Candidate& from : front) add_neighbours(from, f, next);
-      std::ranges::stable_sort(next, is_faster);
+      sort_by(goal_, next);
       if (next.size() > width_ + spare_paths) next.resize(width_ + spare_paths);
       bool is_better = false;
       for (Candidate& candidate : next) {
         candidate.cost = cost_.price(candidate.plan);
-        if (!is_worth_it(before[candidate.from].cost, candidate.cost, options_.least_gain,
+        if (!is_worth_it(before[candidate.from].cost, candidate.cost, goal_, options_.least_gain,
                          share_in(context_.accesses, options_.least_gain_of_all)))
           continue;
-        is_better |= candidate.cost.seconds < states_[0].cost.seconds;
+        is_better |= score_of(candidate.cost, goal_) < score_of(states_[0].cost, goal_);
         states_.push_back(candidate);
       }
-      std::ranges::stable_sort(states_, is_faster);
+      sort_by(goal_, states_);
       if (states_.size() > width_ + 1) states_.resize(width_ + 1);
       find_shares();
       // A step may make things worse once, at the beginning, where the next one makes up for it.
@@ -173,6 +204,7 @@ class Beam {
         const uint64_t hash = hash_of(plan, from.plan, from.hash);
         if (!keeps_funcs(from.plan, plan, options_) || !seen_.insert(hash).second) continue;
         --left_;
+        ++priced_;
         const Totals cost = cost_.totals(plan);
         if (cost.peak_bytes > std::max(options_.most_bytes, from.cost.peak_bytes)) continue;
         const SearchStep step{f, move.name, cost.seconds};
@@ -218,7 +250,7 @@ SearchResult search(const Plan& start, const Context& context, CostModel& cost,
   std::erase_if(found, [&](const State& state) {
     return state.cost.peak_bytes > options.most_bytes && !(has_much && state.plan == start);
   });
-  std::ranges::stable_sort(found, is_faster);
+  sort_by(context.device ? Goal::Time : Goal::TimeAndCode, found);
   for (const State& state : found) result.found.push_back(found_of(state));
   return result;
 }

@@ -7,7 +7,8 @@
 // A beam search: Funcs are visited consumers first, so that a producer knows the loops in which it may run, and twice, so
 // that a consumer also knows its producers. At each Func the best plans go on by its moves, several after another. With
 // width 1 it is a descent that may climb once. The work is bounded by a count of prices, never by a clock: one program
-// has one result on every machine with these figures. Plans that cost the same keep their order.
+// has one result on every machine with these figures. Plans that cost the same keep their order. At last, bodies are made
+// smaller where that costs nearly no time: code that is twice as long takes about twice as long to compile.
 // Method: B. Lowerre, The Harpy Speech Recognition System, 1976 (beam search); the order of decisions as in Adams et al.,
 // Learning to Optimize Halide with Tree Search and Random Programs, SIGGRAPH 2019, section 3.
 #pragma once
@@ -55,12 +56,12 @@ struct FoundPlan {
 struct SearchResult {
   FoundPlan start;
   std::vector<FoundPlan>
-      found;           // the fastest first, the start among them unless `width` others are faster
+      found;  // the best first: the fastest, unless it has much more code; the start unless others are better
   int64_t priced = 0;  // different plans
 };
 
 // The first of those found is never predicted to be slower than the start, if that has not too many bytes, nor than that
-// of a narrower search.
+// of a narrower search, unless it has less code.
 SearchResult search(const Plan& start, const Context& context, CostModel& cost,
                     const SearchOptions& options);
 // Adds what a search from another start of the same program found; the start stays.

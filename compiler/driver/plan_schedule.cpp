@@ -20,6 +20,7 @@ class CallMemory {
   CallMemory(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request)
       : accesses_(outputs), sizes_(accesses_, {planning::unknown_extent}), request_(request) {}
 
+  planning::AccessGraph take_accesses() && { return std::move(accesses_); }
   double callers_bytes() const {
     double result = 0;
     for (size_t i = 0; i < accesses_.images().size(); ++i) {
@@ -46,7 +47,7 @@ class CallMemory {
   }
 
  private:
-  const planning::AccessGraph accesses_;
+  planning::AccessGraph accesses_;
   const planning::SizeModel sizes_;
   const ScheduleRequest& request_;
 
@@ -87,17 +88,19 @@ PlannedSchedules::PlannedSchedules(const std::vector<FuncPtr>& outputs,
   const bool adds_at_places = request.makes(Decision::ScatterStrategy);
   rewrites.for_device = {device, rewrites.splits_sums, adds_at_places, atomics_of(options)};
   rewrites.kept = kept_names(outputs, options, what);
-  const CallMemory memory(outputs, request);
+  CallMemory memory(outputs, request);
   callers_bytes_ = memory.callers_bytes();
   budget_bytes_ = memory.budget();
+  planning::AccessGraph accesses = std::move(memory).take_accesses();
   PlanSearchOptions search;
   search.width = width;
   search.spare_bytes = static_cast<int64_t>(std::max(budget_bytes_ - callers_bytes_, 0.0));
   search.must_fit = options.memory_budget > 0;
   search.what = what;
   search.device = device;
-  const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites);
+  const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites, accesses);
   compute_extern_stages_at_root(rewritten);
+  search.accesses = &accesses;
   search_ = search_plans(rewritten, outputs, options, request.machine, search);
 }
 

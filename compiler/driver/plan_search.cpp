@@ -122,7 +122,9 @@ PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<Fun
   const std::vector<FuncPtr> outputs = graph::apply_wrappers(graph);
   PlanSearch result{{}, planning::import_plan(outputs)};
   const Plan& given = result.given;
-  const planning::AccessGraph accesses(outputs);
+  planning::AccessGraph known;
+  if (search.accesses) known = std::move(*search.accesses);
+  const planning::AccessGraph accesses(outputs, std::move(known));
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
   planning::CostModel cost(accesses, sizes, machine, search.device);

@@ -29,8 +29,9 @@ struct PlanSearchOptions {
   int64_t spare_bytes = 0;  // that may be alive at once
   bool must_fit = false;    // however slow the program gets
   Scheduling what = Scheduling::Everything;
-  std::set<std::string> without = {};        // moves that are not made
-  const planning::Device* device = nullptr;  // that runs the program; null: the processor does
+  std::set<std::string> without = {};         // moves that are not made
+  planning::AccessGraph* accesses = nullptr;  // of a program like this one, which is taken
+  const planning::Device* device = nullptr;   // that runs the program; null: the processor does
 };
 
 // The updates of a device that are atomic.

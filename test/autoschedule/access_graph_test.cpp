@@ -165,5 +165,21 @@ TEST(AccessGraphOfUnrolledSteps, VisitsEachNodeAFixedNumberOfTimes) {
   EXPECT_LT(chain / 50, 400u);
 }
 
+TEST(AccessGraphLikeAnEarlierOne, IsTheSameWithFewerVisits) {
+  ImageParam image(Float(32), 1, "image");
+  Func first("first"), second("second"), out("out");
+  first(x) = image(clamp(x, 0, 99)) * 2.0f;
+  second(x) = first(cast<int>(first(x))) + first(x + 1);
+  out(x) = second(x) + second(x + 2);
+  planning::AccessGraph before(functions({out}));
+  first.in(second)
+      .compute_root();  // second reads it instead, and all numbers of later Funcs are others
+  const planning::AccessGraph fresh(functions({out}));
+  const planning::AccessGraph after(functions({out}), std::move(before));
+  EXPECT_EQ(print(after), print(fresh));
+  EXPECT_GT(after.nodes_visited(), 0u);
+  EXPECT_LT(after.nodes_visited(), fresh.nodes_visited());
+}
+
 }  // namespace
 }  // namespace retrograde

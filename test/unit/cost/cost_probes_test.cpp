@@ -551,6 +551,13 @@ TEST_F(CostProbes, BodiesBeyondTheCacheOfInstructionsAreFetched) {
   EXPECT_NEAR(vector_ns("4") - vector_ns("2"), 0.25 * 40 * 48 * 7 / 64, 2);
 }
 
+// Two loops, and two loads, a sum and a store for each copy.
+TEST_F(CostProbes, CodeGrowsWithItsCopies) {
+  out(x, y) = in(x, y) + in(x, y + 1);
+  EXPECT_EQ(cost_of("out  root  y, x:16, vector x\n").code, 2 * code_of_loop + 4);
+  EXPECT_EQ(cost_of("out  root  y:4, x:16, unroll y, vector x\n").code, 2 * code_of_loop + 16);
+}
+
 // Rows of 16 KB: lowering keeps four of a window over three rows, whatever the height of the strip.
 TEST_F(CostProbes, AWindowKeepsAFewRowsOfAStrip) {
   rows_sum(x, y) = in(x, y) + in(x + 1, y);
