@@ -7,7 +7,8 @@
 //   out   root  parallel y:64, y, c, x:16, vector x
 //   blur  at out/y  store at out/y:64   y, x:16, vector x
 //
-// Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already.
+// Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already;
+// L11: all stages that share the loops of rows get the strips.
 // Method: rows go along the outermost dimension of the consumer in which rows overlap or, without one, along the
 // innermost that moves the Func. Strips are as high as enough tasks for each thread allow, and as wide as rows: each end of
 // a row in a tile takes long. Dimensions of few values run inside of a row if all of them share it.
@@ -31,8 +32,8 @@ std::optional<StageId> stage_around_reads(const Plan& plan, const Context& conte
   StageId stage = *first;
   while (plan.of(stage.func).placement.compute.kind == Level::Kind::At)
     stage = plan.of(stage.func).placement.compute.loop.stage;
-  const bool has_strips = has_loops(plan, stage.func) && shared_loops(plan, stage) == 0;
-  return has_strips ? std::optional(stage) : std::nullopt;
+  while (plan.nest(stage).shared_with) stage = plan.nest(stage).shared_with->stage;
+  return has_loops(plan, stage.func) ? std::optional(stage) : std::nullopt;
 }
 
 // The loops of a stage at root, with one of them as a loop over the rows of a strip.
@@ -61,7 +62,8 @@ class StripFinder {
     const bool are_whole =
         std::ranges::find(nest_.loops.begin(), outside, lane_, &Loop::iterator) == outside;
     const bool are_there = outer_step(nest_, iterator, nest_.loops[*row].step) > 0;
-    return are_there && are_whole ? std::optional(Strip{plan_, *row}) : new_strip(iterator, few);
+    if (are_there && are_whole) return Strip{plan_, *row};
+    return shared_loops(plan_, host_) == 0 ? new_strip(iterator, few) : shared_strip(*row);
   }
 
  private:
@@ -88,6 +90,29 @@ class StripFinder {
     return nest;
   }
 
+  // The height of as many strips as keep all threads busy, beside the iterations of the loops around.
+  int64_t strip_height(int64_t tasks, int64_t rows) const {
+    const int64_t enough = context_.machine.enough_tasks();
+    int64_t strips = (enough + tasks - 1) / tasks;
+    while (strips * tasks % context_.machine.threads != 0) ++strips;  // no thread waits
+    return (rows + strips - 1) / strips;
+  }
+
+  // Loops that stages share stay, and all of these stages get the strips.
+  std::optional<Strip> shared_strip(size_t row) const {
+    int64_t tasks = 1;
+    for (size_t d = 0; d <= row; ++d) {
+      if (row >= shared_loops(plan_, host_) || !may_run_at_once(context_, host_, nest_, d))
+        return std::nullopt;
+      if (d < row) tasks *= trips(extents_, nest_, d);
+    }
+    const Loop& rows = nest_.loops[row];
+    const int64_t height = strip_height(tasks, trips(extents_, nest_, row)) * rows.step;
+    if (height <= rows.step || nest_.loops[0].kind != ForType::Parallel) return std::nullopt;
+    std::optional<Plan> plan = with_strips(plan_, {host_, static_cast<int16_t>(row)}, height);
+    return plan ? std::optional(Strip{std::move(*plan), row + 1}) : std::nullopt;
+  }
+
   // Outside of the strips are the loops that are outside of the rows, without those of the lanes and of few values.
   std::optional<Strip> new_strip(int iterator, int64_t few) const {
     const Nest plain = without_tiles();
@@ -104,10 +129,7 @@ class StripFinder {
       if (d != at) (is_around ? outside : inside).push_back(plain.loops[d]);
     }
     const Loop& rows = plain.loops[at];
-    const int64_t count = trips(extents_, plain, at);
-    int64_t strips = (enough + tasks - 1) / tasks;
-    while (strips * tasks % context_.machine.threads != 0) ++strips;  // no thread waits
-    const int64_t height = (count + strips - 1) / strips * rows.step;
+    const int64_t height = strip_height(tasks, trips(extents_, plain, at)) * rows.step;
     nest.loops = outside;
     nest.loops.push_back(rows);
     nest.loops.insert(nest.loops.end(), inside.begin(), inside.end());
