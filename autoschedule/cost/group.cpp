@@ -76,15 +76,12 @@ class GroupBuilder {
     run.facts = &facts_.of(stage, *inlined_.at(stage));
     run.path = path_around(stage, nest, run.place);
     run.storage_place = is_at(stage.func) ? store_place(run) : 1;
-    double share = 1;
-    const Cover extents = extents_of(run, share, run.kept);
+    const Cover extents = extents_of(run);
     run.nest = nest_trips(nest, extents);
-    const size_t first = run.path.size() - run.place;
-    if (first < run.nest.trips.size() && !is_lane_loop(run, first)) run.nest.trips[first] *= share;
     for (size_t depth = run.path.size() - run.place; depth < nest.loops.size(); ++depth)
-      run.path.push_back(add_node(run.path.back(), {stage, static_cast<int16_t>(depth)},
-                                  nest.loops[depth].kind,
-                                  is_lane_loop(run, depth) ? 1 : run.nest.trips[depth]));
+      run.path.push_back(add_node(
+          run.path.back(), {stage, static_cast<int16_t>(depth)}, nest.loops[depth].kind,
+          is_lane_loop(run, depth) ? 1 : run.nest.trips[depth], depth == 0 ? run.share : 1));
     run.cover = covers_of(run, nest, extents);
     if (run.nest.lanes.iterator >= 0) run.nest.lanes.block = block_of(run);
     return runs_.emplace(stage, std::move(run)).first->second;
@@ -126,14 +123,15 @@ class GroupBuilder {
     return {run.path.begin(), run.path.begin() + static_cast<std::ptrdiff_t>(count)};
   }
 
-  int add_node(int parent, const LoopRef& loop, ForType kind, double trips) {
+  int add_node(int parent, const LoopRef& loop, ForType kind, double trips, double share) {
     LoopNode child;
     const LoopNode& outer = node(parent);
     child.parent = parent;
     child.loop = loop;
     child.kind = kind;
     child.trips = trips;
-    child.times = outer.times * trips;
+    child.share = share;
+    child.times = outer.times * share * trips;
     child.in_parallel = outer.in_parallel || runs_at_once(kind);
     child.speedup = outer.speedup;
     child.chunks = outer.chunks;
@@ -179,21 +177,21 @@ class GroupBuilder {
   }
 
   // The points of all loops of the nest. Where a Func is stored outside of the loop in which it is computed, an iteration
-  // computes only what the iteration before has not. `share`: the iterations that compute anything.
-  Cover extents_of(const StageRun& run, double& share, std::vector<int64_t>& kept) {
+  // computes only what the iteration before has not.
+  Cover extents_of(StageRun& run) {
     if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);
     std::vector<int64_t> box = box_in(run.id.func, run.path, run.place);
     const std::vector<int64_t> all = box;
-    kept.assign(box.size(), 0);
+    run.kept.assign(box.size(), 0);
     for (size_t count = run.place - 1; count >= run.storage_place; --count) {
       const std::vector<int64_t> outer = box_in(run.id.func, run.path, count);
       const double trips = full_trips(run.path[count], count);
       for (size_t d = 0; d < box.size(); ++d) {
-        if (outer[d] <= all[d] || kept[d] > 0 || trips <= 1) continue;
-        kept[d] = static_cast<int64_t>(std::bit_ceil(static_cast<uint64_t>(all[d])));
+        if (outer[d] <= all[d] || run.kept[d] > 0 || trips <= 1) continue;
+        run.kept[d] = static_cast<int64_t>(std::bit_ceil(static_cast<uint64_t>(all[d])));
         const double step = double(outer[d] - all[d]) / (trips - 1);
         box[d] = std::clamp<int64_t>(static_cast<int64_t>(std::ceil(step)), 1, all[d]);
-        share *= std::min(1.0, step);
+        run.share *= double(outer[d]) / (trips * double(box[d]));
       }
     }
     return cover_of_box(run.id, box, sizes_);

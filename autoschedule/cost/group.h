@@ -31,6 +31,7 @@ struct LoopNode {
   LoopRef loop;     // of the first stage that has it
   ForType kind = ForType::Serial;
   double trips = 1, times = 1;  // iterations in one run of the loops around it, and in all
+  double share = 1;             // of runs that are like that one (StageRun)
   double speedup = 1;           // by threads
   double chunks = 1;            // iterations of the parallel loops, with those around
   bool in_parallel = false;     // it, or a loop around it
@@ -45,6 +46,9 @@ struct StageRun {
   // By dimension of a Func that is stored outside of its loops: the elements that lowering keeps, in a circular window whose
   // extent is a power of two; 0: all of the box.
   std::vector<int64_t> kept;
+  // The points of all runs of the stage's own nest, by those of one that adds to what is kept: the first one computes the
+  // whole box, and others may have nothing to add.
+  double share = 1;
   std::vector<int> path;     // nodes from the root to the innermost loop
   size_t place = 1;          // how many of them are around the stage's own nest
   size_t storage_place = 1;  // and around the storage of its Func

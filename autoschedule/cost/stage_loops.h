@@ -31,7 +31,7 @@ class StageLoops {
     return kind(d) != ForType::Unrolled && kind(d) != ForType::Vectorized;
   }
   double place_times() const {
-    return group_.nodes[static_cast<size_t>(run_.path[run_.place - 1])].times;
+    return run_.share * group_.nodes[static_cast<size_t>(run_.path[run_.place - 1])].times;
   }
   bool moves(size_t d, IteratorSet depends) const { return (run_.nest.moves[d] & depends) != 0; }
   bool is_vector(IteratorSet depends) const { return (lanes_.moves & depends) != 0; }

@@ -274,6 +274,7 @@ class TrafficWalk {
 
   void visit(int n, double times) {
     const LoopNode& node = group_.nodes[static_cast<size_t>(n)];
+    times *= node.share;
     const bool outside =
         node.parent < 0 || !group_.nodes[static_cast<size_t>(node.parent)].in_parallel;
     const bool is_loop = node.parent >= 0;
@@ -282,7 +283,7 @@ class TrafficWalk {
     const bool fits =
         bytes_of(all) <= room(!outside) || (is_loop && bytes_of(in_turn) <= room(node.in_parallel));
     const size_t held = held_.size();
-    const bool is_done = fits && load_kept(all, in_turn, times * std::min(1.0, node.trips), n);
+    const bool is_done = fits && load_kept(all, in_turn, times, n);
     if (is_done) return held_.resize(held);
     const double kept = is_loop && !fits ? 1 - lost_share(in_turn, room(node.in_parallel)) : 0;
     if (kept > 0) {

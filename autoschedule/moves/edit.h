@@ -145,6 +145,9 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
 // changes that needs constant extents (L4), or a row of a window does (L9). Requires: the loop is one of pure iterators.
 std::optional<Plan> with_step(const Plan& plan, const LoopRef& loop, int64_t step,
                               const Context& context);
+// The plan in which a loop with this step stands around another one, in all stages that share it; what is computed in that
+// stays there. Requires: the step is larger.
+std::optional<Plan> with_strips(const Plan& plan, const LoopRef& rows, int64_t step);
 // The elements in memory from lane to lane of a vector along the iterator, in the storage of the Func that is read or, if it
 // can be stored otherwise, in the best one; 0: no such number.
 int64_t lane_stride(const Plan& plan, const Context& context, const Access& read, int iterator);

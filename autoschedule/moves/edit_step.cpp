@@ -1,5 +1,6 @@
-// A loop takes another step, in all stages that share it; what is computed in it follows.
+// A loop takes another step, or becomes two, in all stages that share it; what is computed in it follows.
 #include <algorithm>
+#include <utility>
 
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/readers.h"
@@ -28,6 +29,11 @@ bool has_smaller_step(const Nest& nest, int depth, int inner_depth) {
   return std::ranges::find(first + 1, last, first->iterator, &Loop::iterator) != last;
 }
 
+bool runs_in(const Plan& plan, StageId stage, const LoopRef& own) {
+  return plan.nest(stage).loops.size() > static_cast<size_t>(own.depth) &&
+         owner_of(plan, {stage, own.depth}) == own.stage;
+}
+
 void change_step(Nest& nest, int depth, int64_t step) {
   const auto at = nest.loops.begin() + depth;
   const Loop loop = *at;
@@ -50,9 +56,33 @@ std::optional<Plan> with_step(const Plan& plan, const LoopRef& loop, int64_t ste
     FuncPlan changed = *plan.funcs[f];
     for (size_t s = 0; s < changed.nests.size(); ++s) {
       const StageId stage{func, static_cast<int16_t>(s)};
-      const bool has_loop = changed.nests[s].loops.size() > static_cast<size_t>(own.depth);
-      if (has_loop && owner_of(plan, {stage, own.depth}) == own.stage)
-        change_step(changed.nests[s], own.depth, step);
+      if (runs_in(plan, stage, own)) change_step(changed.nests[s], own.depth, step);
+    }
+    if (!(changed == *plan.funcs[f]))
+      result.funcs[f] = std::make_shared<FuncPlan>(std::move(changed));
+  }
+  return broken_structure(result, plan).empty() ? std::optional(std::move(result)) : std::nullopt;
+}
+
+std::optional<Plan> with_strips(const Plan& plan, const LoopRef& rows, int64_t step) {
+  const LoopRef own{owner_of(plan, rows), rows.depth};
+  Plan result = plan;
+  for (size_t f = 0; f < plan.funcs.size(); ++f) {
+    FuncPlan changed = *plan.funcs[f];
+    const auto follow = [&](LoopRef& loop) {
+      if (loop.depth >= own.depth && runs_in(plan, loop.stage, own)) ++loop.depth;
+    };
+    for (Level* level :
+         {&changed.placement.compute, &changed.placement.store, &changed.placement.hoist}) {
+      if (level->kind == Kind::At) follow(level->loop);
+    }
+    for (size_t s = 0; s < changed.nests.size(); ++s) {
+      Nest& nest = changed.nests[s];
+      if (nest.shared_with) follow(*nest.shared_with);
+      if (!runs_in(plan, {static_cast<FuncId>(f), static_cast<int16_t>(s)}, own)) continue;
+      Loop& loop = nest.loops[static_cast<size_t>(own.depth)];
+      const ForType kind = std::exchange(loop.kind, ForType::Serial);
+      insert_step(nest, loop.iterator, step, static_cast<size_t>(own.depth), kind);
     }
     if (!(changed == *plan.funcs[f]))
       result.funcs[f] = std::make_shared<FuncPlan>(std::move(changed));

@@ -7,10 +7,11 @@
 //   out   root  parallel y:64, y, c, x:16, vector x
 //   blur  at out/y  store at out/y:64   y, x:16, vector x
 //
-// Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already.
+// Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already;
+// L11: all stages that share the loops of rows get the strips.
 // Method: rows go along the outermost dimension of the consumer in which rows overlap or, without one, along the
 // innermost that moves the Func. Strips are as high as enough tasks for each thread allow, and as wide as rows: each end of
-// a row in a tile takes long. Dimensions of few values run inside of a row if all of them share it.
+// a row in a tile takes long. A dimension of few values runs inside of a row if all of them share it.
 #include <algorithm>
 
 #include "autoschedule/moves/edit.h"
@@ -31,8 +32,8 @@ std::optional<StageId> stage_around_reads(const Plan& plan, const Context& conte
   StageId stage = *first;
   while (plan.of(stage.func).placement.compute.kind == Level::Kind::At)
     stage = plan.of(stage.func).placement.compute.loop.stage;
-  const bool has_strips = has_loops(plan, stage.func) && shared_loops(plan, stage) == 0;
-  return has_strips ? std::optional(stage) : std::nullopt;
+  while (plan.nest(stage).shared_with) stage = plan.nest(stage).shared_with->stage;
+  return has_loops(plan, stage.func) ? std::optional(stage) : std::nullopt;
 }
 
 // The loops of a stage at root, with one of them as a loop over the rows of a strip.
@@ -52,16 +53,25 @@ class StripFinder {
     Plan plan;
     size_t row = 0;  // the depth of the loop over rows; storage is in the loop around it
   };
-  // The strips that are there if they have whole rows, or new ones, inside of whose rows loops of up to `few` iterations
-  // run. None along the iterator of the lanes: a row would be a vector.
-  std::optional<Strip> along(int iterator, int64_t few) const {
+  // The strips that are there if they have whole rows, or new ones, inside of whose rows loops over `inside` run. None along
+  // the iterator of the lanes: a row would be a vector.
+  std::optional<Strip> along(int iterator, IteratorSet inside) const {
     const std::optional<size_t> row = row_of(nest_, iterator);
     if (lane_ == iterator || !row) return std::nullopt;
     const auto outside = nest_.loops.begin() + static_cast<std::ptrdiff_t>(*row);
     const bool are_whole =
         std::ranges::find(nest_.loops.begin(), outside, lane_, &Loop::iterator) == outside;
     const bool are_there = outer_step(nest_, iterator, nest_.loops[*row].step) > 0;
-    return are_there && are_whole ? std::optional(Strip{plan_, *row}) : new_strip(iterator, few);
+    if (are_there && are_whole) return Strip{plan_, *row};
+    return shared_loops(plan_, host_) == 0 ? new_strip(iterator, inside) : shared_strip(*row);
+  }
+  // The iterators that have few values.
+  std::vector<int> short_loops() const {
+    std::vector<int> found;
+    const Nest plain = without_tiles();
+    for (size_t d = 0; d < body_depth(plain); ++d)
+      if (trips(extents_, plain, d) <= few_values) found.push_back(plain.loops[d].iterator);
+    return found;
   }
 
  private:
@@ -88,8 +98,31 @@ class StripFinder {
     return nest;
   }
 
-  // Outside of the strips are the loops that are outside of the rows, without those of the lanes and of few values.
-  std::optional<Strip> new_strip(int iterator, int64_t few) const {
+  // The height of as many strips as keep all threads busy, beside the iterations of the loops around.
+  int64_t strip_height(int64_t tasks, int64_t rows) const {
+    const int64_t enough = context_.machine.enough_tasks();
+    int64_t strips = (enough + tasks - 1) / tasks;
+    while (strips * tasks % context_.machine.threads != 0) ++strips;  // no thread waits
+    return (rows + strips - 1) / strips;
+  }
+
+  // Loops that stages share stay, and all of these stages get the strips.
+  std::optional<Strip> shared_strip(size_t row) const {
+    int64_t tasks = 1;
+    for (size_t d = 0; d <= row; ++d) {
+      if (row >= shared_loops(plan_, host_) || !may_run_at_once(context_, host_, nest_, d))
+        return std::nullopt;
+      if (d < row) tasks *= trips(extents_, nest_, d);
+    }
+    const Loop& rows = nest_.loops[row];
+    const int64_t height = strip_height(tasks, trips(extents_, nest_, row)) * rows.step;
+    if (height <= rows.step || nest_.loops[0].kind != ForType::Parallel) return std::nullopt;
+    std::optional<Plan> plan = with_strips(plan_, {host_, static_cast<int16_t>(row)}, height);
+    return plan ? std::optional(Strip{std::move(*plan), row + 1}) : std::nullopt;
+  }
+
+  // Outside of the strips are the loops that are outside of the rows, without those of the lanes and those over `within`.
+  std::optional<Strip> new_strip(int iterator, IteratorSet within) const {
     const Nest plain = without_tiles();
     const size_t at = *row_of(plain, iterator);
     Nest nest = plain;
@@ -99,15 +132,13 @@ class StripFinder {
     for (size_t d = 0; d < plain.loops.size(); ++d) {
       if (d < at && !may_run_at_once(context_, host_, plain, d)) return std::nullopt;
       const int64_t count = trips(extents_, plain, d);
-      const bool is_around = d < at && count > few && plain.loops[d].iterator != lane_;
+      const int i = plain.loops[d].iterator;
+      const bool is_around = d < at && count > 1 && i != lane_ && !(within & set_of(i));
       if (is_around) tasks = std::min(tasks * count, enough);
       if (d != at) (is_around ? outside : inside).push_back(plain.loops[d]);
     }
     const Loop& rows = plain.loops[at];
-    const int64_t count = trips(extents_, plain, at);
-    int64_t strips = (enough + tasks - 1) / tasks;
-    while (strips * tasks % context_.machine.threads != 0) ++strips;  // no thread waits
-    const int64_t height = (count + strips - 1) / strips * rows.step;
+    const int64_t height = strip_height(tasks, trips(extents_, plain, at)) * rows.step;
     nest.loops = outside;
     nest.loops.push_back(rows);
     nest.loops.insert(nest.loops.end(), inside.begin(), inside.end());
@@ -171,13 +202,18 @@ std::vector<Plan> slide(const Plan& plan, FuncId func, const Context& context) {
   for (const int16_t dimension : order) {  // the innermost first
     const auto i = std::ranges::find(iterators, dimension, &Iterator::dimension);
     if (i == iterators.end()) continue;
-    const auto window_along = [&](int64_t few) {
-      auto strip = strips.along(static_cast<int>(i - iterators.begin()), few);
+    const auto window_along = [&](IteratorSet inside) {
+      auto strip = strips.along(static_cast<int>(i - iterators.begin()), inside);
       return strip ? window_in(std::move(*strip), *host, func, context) : std::nullopt;
     };
-    auto window = window_along(few_values), apart = window_along(1);
-    const bool share_row = window && apart && product_of(window->box) <= product_of(apart->box);
-    if (!share_row && apart) window = std::move(apart);
+    IteratorSet inside = 0;
+    auto window = window_along(inside);
+    for (const int other : strips.short_loops()) {
+      auto shared = window_along(inside | set_of(other));
+      if (!shared || (window && product_of(shared->box) > product_of(window->box))) continue;
+      window = std::move(shared);
+      inside |= set_of(other);
+    }
     if (window && (!best || window->overlaps)) best = std::move(window);
   }
   if (best) add_placed(plans, best->strip.plan, func, best->placement, best->box, context);

@@ -108,10 +108,10 @@ TEST_F(StencilProbes, RowsThatOverlapAreLoadedOnce) {
 TEST_F(StencilProbes, StripsRecomputeTheirBorders) {
   const auto seconds_of = [](const Cost& cost) { return cost.stages[0].compute_seconds; };
   EXPECT_NEAR(seconds_of(strips) / seconds_of(root), 34.0 / 32, 0.02);
-  // Each row that slides waits for its stores.
+  // The first row of a strip computes the whole window. Each row that slides waits for its stores.
   const Machine machine = probed_machine();
   const double waits = rows * slice_iterations * machine.iteration_ns * 1e-9 / machine.threads;
-  EXPECT_NEAR((seconds_of(sliding) - waits) / seconds_of(root), 1, 0.02);
+  EXPECT_NEAR((seconds_of(sliding) - waits) / seconds_of(root), 34.0 / 32, 0.02);
   EXPECT_GT(compute_seconds(inlined), compute_seconds(sliding));
 }
 
