@@ -60,10 +60,19 @@ bool is_pure_in_all_stages(const Context& context, FuncId func, int dimension) {
   });
 }
 
-// Copies of short loops of a reduction inside of all others but the lanes, which are innermost. `additions`: of a copy.
+// Whether the iterator decides selects of the stage, which copies for each of its points don't need.
+bool decides_selects(const StageNode& stage, int iterator) {
+  return std::ranges::any_of(stage.operations, [&](const OperationCount& operation) {
+    return (operation.decided_by & set_of(iterator)) != 0;
+  });
+}
+
+// Copies of short loops of a reduction inside of all others but the lanes, which are innermost: first of those that decide
+// selects. `additions`: of a copy.
 void copy_short_loops(Nest& nest, const Plan& plan, const Context& context, StageId stage,
                       int64_t additions) {
-  if (!adds_in_any_order(context, context.accesses.stage(stage))) return;
+  const StageNode& node = context.accesses.stage(stage);
+  if (!adds_in_any_order(context, node)) return;
   int64_t size = operations(plan, context, stage) + additions;
   const auto is_short = [&](Loop& loop) {
     if (!is_reduction(context, stage, loop.iterator) || loop.kind != ForType::Serial) return false;
@@ -76,10 +85,13 @@ void copy_short_loops(Nest& nest, const Plan& plan, const Context& context, Stag
     return true;
   };
   std::vector<Loop> copies;
-  for (size_t d = body_depth(nest); d-- > 0;) {
-    if (!is_short(nest.loops[d])) continue;
-    copies.insert(copies.begin(), nest.loops[d]);
-    nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(d));
+  for (const bool decides : {true, false}) {
+    for (size_t d = body_depth(nest); d-- > 0;) {
+      if (decides_selects(node, nest.loops[d].iterator) != decides || !is_short(nest.loops[d]))
+        continue;
+      copies.insert(copies.begin(), nest.loops[d]);
+      nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(d));
+    }
   }
   nest.loops.insert(nest.loops.begin() + static_cast<std::ptrdiff_t>(body_depth(nest)),
                     copies.begin(), copies.end());
