@@ -17,7 +17,7 @@ struct LoadedProgram {
   // expects.
   std::vector<FuncPtr> outputs;
 };
-// Inputs are bound to the values that autoschedule/keep_graph.h kept with the graph, and else to made-up ones.
+// Inputs are bound to the values that driver/keep_graph.h kept with the graph, and else to made-up ones.
 // Requires: the text of a graph (graph/graph.h).
 LoadedProgram load_program(const std::string& text, const std::string& values = "");
 

@@ -76,7 +76,7 @@ bool is_among(const FuncPtr& f, const std::vector<FuncPtr>& some) {
   return std::ranges::find(some, f) != some.end();
 }
 
-// What inlining would copy without end.
+// Refuses to inline bodies that would be copied without end.
 void check_inlined_bodies(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
                           const std::vector<FuncPtr>& inlined) {
   std::vector<FuncPtr> has_place = stored;  // what its user named, and what a schedule may store

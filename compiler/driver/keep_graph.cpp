@@ -63,7 +63,7 @@ std::string values_as(const halide_buffer_t& buffer, size_t count) {
   return out.str();
 }
 
-// Of a buffer whose elements lie together; empty for others, large ones, and types without a literal.
+// The values of a dense buffer; empty for others, large ones, and types without a literal.
 std::string values_of(const halide_buffer_t& buffer, const Type& type) {
   size_t count = 1;
   for (int d = 0; d < buffer.dimensions; d++) {

@@ -13,7 +13,7 @@
 
 namespace retrograde::driver {
 
-// What a search found for a copy of a graph, the best first.
+// The schedules that a search found for a copy of a graph, the best first.
 class PlannedSchedules {
  public:
   // Schedules the Funcs of the graph, whose wrappers have been applied, as far as their user did not. Bytes that are not

@@ -24,7 +24,7 @@ struct PlanSearch {
 };
 
 struct PlanSearchOptions {
-  // Of the beam. The best plan is never predicted to be slower than that of a narrower search.
+  // The width of the beam. The best plan is never predicted to be slower than that of a narrower search.
   int width = 1;
   int64_t spare_bytes = 0;  // that may be alive at once
   bool must_fit = false;    // however slow the program gets

@@ -27,7 +27,7 @@ struct ScheduleRequest {
 ScheduleRequest request_for(const Target& target, const AutoscheduleOptions& options,
                             const MachineParams& params = {});
 
-// Of which Funcs of a graph: adjoints and what is computed with them, or all.
+// The Funcs of a graph that get a schedule: adjoints and the Funcs computed with them, or all.
 enum class Scheduling : uint8_t { Gradients, Everything };
 
 // Bytes of a call, at the most: inputs and outputs, too.

@@ -42,7 +42,7 @@ class RecurrenceBlockFinder {
   const SumOrder order_;
 };
 
-// What an element adds to the ones after it: response(order - 1 - k + n, k) to the n-th after the element before a
+// The terms that an element adds to the ones after it: response(order - 1 - k + n, k) to the n-th after the element before a
 // block, if the k-th before that is 1 and the others are 0.
 FuncPtr make_response(const FuncContents& f, const LinearRecurrence& recurrence,
                       const std::vector<std::string>& signals) {
@@ -92,7 +92,7 @@ class Blocker {
     response_ = make_response(*f, recurrence_, signals_);
   }
 
-  // What the update becomes.
+  // The updates that replace it.
   std::vector<Definition> run() const {
     std::vector<Definition> result;
     add_part(r_.min, simplify(begin_ - r_.min), result);
@@ -129,7 +129,7 @@ class Blocker {
     return definition(domain, args_at(r), at(r, value));
   }
 
-  // Those that the next block starts from.
+  // The elements that the next block starts from.
   Definition last_elements() const {
     const DomainPtr domain = make_domain();
     const Expr last = add_loop(domain, "last", 0, order_);

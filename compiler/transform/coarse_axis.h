@@ -13,7 +13,7 @@
 
 namespace retrograde::transform {
 
-// Of the variables of a stage, with constant ends; an undefined end is not known.
+// The ranges of the variables of a stage, with constant ends; an undefined end is not known.
 using VariableRanges = std::map<std::string, Interval>;
 
 class CoarseAxis {
@@ -29,7 +29,7 @@ class CoarseAxis {
   };
   Dependence of(const Expr& e);
 
-  // What the index ranges over.
+  // The values of the index.
   Interval range_of(const Expr& index) const;
   // An expression that depends on the variable through `index`, as one of the coordinate in the grid. The coordinate
   // has the variable's name.

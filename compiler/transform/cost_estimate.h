@@ -1,5 +1,4 @@
-// What it costs to compute a value: for counting operations, for default schedules, and for Funcs
-// that differentiation makes only where they pay.
+// cost_estimate.h -- operations of a value: for counting them, and for Funcs that are made only where they pay.
 #pragma once
 
 #include <vector>
@@ -10,10 +9,10 @@
 
 namespace retrograde::transform {
 
-// Operations up to which a value is computed again rather than stored.
+// Operations up to which a value is recomputed rather than stored.
 inline constexpr double cheap = 6;
 
-// Of the node itself, without what it reads; what operators take is in their table
+// The work of a node, without its operands; what operators take is in their table
 // (ir/operators.def). Integers are indices and borders, mostly simplified away: only where floats
 // take part is there work.
 Work work_of(const Expr& node);
@@ -21,14 +20,14 @@ Work work_of(const Expr& node);
 // as long as, and a division four more than a multiplication; multiplications come with an addition
 // each, and comparisons with the choice that they decide.
 double operations_of(const Expr& node);
-// Of all that values of a Func are made of, each node once; of a call of a Func or of an image what
+// The operations of all nodes of the values, each node once; a call of a Func or of an image has those that
 // `of_call` says, beside its indices. Integer values are work, too: a vector holds more of narrow ones.
 double operations_of_values(const std::vector<Expr>& values,
                             FunctionRef<double(const Call&)> of_call);
 // Iterations of its reduction domain: what a sum adds up for an element. Of a loop whose extent is not
 // known so many as given.
 double terms_of(const Definition& stage, double of_unknown);
-// Of the widest number that a value is made of, indices aside.
+// The bits of the widest number that a value is made of, indices aside.
 int bits_of_values(const std::vector<Expr>& values);
 
 }  // namespace retrograde::transform

@@ -42,7 +42,7 @@ bool is_product(const Expr& e) {
   return cast ? is_product(cast->value) : e.kind() == Kind::Mul;
 }
 
-// What an update adds to its element; undefined: it is no such update.
+// The term that an update adds to its element; undefined: it is no such update.
 Expr term_of(const FuncContents& f, const Definition& update, size_t k) {
   const auto* sum = update.values[k].as<Binary>();
   if (!sum || !is_addition(update.values[k]) ||

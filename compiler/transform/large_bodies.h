@@ -1,6 +1,6 @@
 // large_bodies.h -- Funcs that inlining would copy without end.
 //
-// A Func that nobody scheduled is inlined: that is what its user expects, and of a chain of Funcs
+// An unscheduled Func is inlined: that is what its user expects, and of a chain of Funcs
 // each of which reads the one before at k places it makes k^n copies of the first. A pyramid of
 // five levels is enough for a body that no code generator finishes. So there is a bound on what is
 // copied, above anything that is worth computing again: what is larger, and read at more than one

@@ -1,5 +1,4 @@
-// placement_limits.h -- what places that data decide, extern stages and the part that a user
-// scheduled leave to choose.
+// placement_limits.h -- the Funcs that data-dependent indices, extern stages or a user's schedule keep in place.
 #pragma once
 
 #include <unordered_set>

@@ -111,7 +111,7 @@ std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop
   auto form = decompose(index, names_of(loops));
   if (!form) return std::nullopt;
   double iterations = 1, reach = 1;
-  // Of the long ones, those of larger steps go over what the one of the smallest leaves, as the parts of a
+  // Long loops of larger steps go over what the one of the smallest leaves, as the parts of a
   // sum go over its rows.
   std::optional<double> smallest_step;
   for (size_t i = 0; i < loops.size(); ++i) {

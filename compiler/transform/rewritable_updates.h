@@ -29,7 +29,7 @@ class RewritableUpdates {
   std::optional<SizeEstimate> sizes_;  // computed when it is needed
 };
 
-// Whether so many iterations are possible, as far as is known.
+// Whether the extent may be `least` or more, as far as is known.
 bool is_long(const Expr& extent, int64_t least);
 
 }  // namespace retrograde::transform

@@ -18,7 +18,7 @@ Interval interval_of(const Expr& min, const Expr& extent) {
   return {min, min.defined() && extent.defined() ? min + extent - 1 : Expr()};
 }
 
-// What is known better or for the first time.
+// Takes the ends that are known better or for the first time.
 void refine(Interval& known, const Interval& by) {
   if (!known.min.defined()) known.min = by.min;
   if (!known.max.defined()) known.max = by.max;
@@ -60,7 +60,7 @@ void refine_by(Interval& known, const Expr& min, const Expr& extent,
   if (all.max.defined()) refine(known, {{}, bounds_of(all.max, parameters).max});
 }
 
-// What its user or its maker says of its size.
+// The size that its user or its maker states.
 Interval told(const FuncContents& f, size_t d, const Scope<Interval>& parameters) {
   Interval result;
   for (const auto* entries : {&f.schedule.bounds, &f.schedule.estimates}) {

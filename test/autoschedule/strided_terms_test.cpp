@@ -14,7 +14,6 @@
 #include "graph/graph.h"
 #include "lower/lower.h"
 #include "simplify/simplify.h"
-#include "support/costly_vectors.h"
 #include "transform/strided_terms.h"
 
 namespace retrograde {
@@ -257,17 +256,6 @@ TEST(StridedTerms, HaveTilesOfThreePhases) {
   expected.for_each_element([&](const int* at) {
     EXPECT_NEAR(found(at), expected(at), 1e-3f * (1 + std::abs(expected(at))));
   });
-}
-
-// No vector in a loop over terms divides, takes remainders or compares.
-TEST(StridedTerms, VectorsDoNotDivide) {
-  Func out = without_zeros(Doubled().out);
-  Pipeline(out).auto_schedule(get_host_target());
-  const Stmt code =
-      lower::lower("doubled", {out.function()}, lower::infer_arguments({out.function()}), {}).body;
-  const CostlyVectors found = costly_vectors(code, ".s1.r");
-  EXPECT_GT(found.loops, 0);
-  EXPECT_EQ(found.operations, 0);
 }
 
 // The gradient of a function of the sums computes them again.

@@ -28,27 +28,27 @@ def found(files, depends):
         return check_layers.findings(root)[1]
 
 
-LAYERS = {"graph": "", "frontend": "graph", "autoschedule": "frontend", "jit": "frontend",
-          "driver": "jit autoschedule"}
+LAYERS = {"graph": "", "frontend": "graph", "transform": "frontend", "jit": "frontend",
+          "driver": "jit transform"}
 
 
 class Layers(unittest.TestCase):
     def test_includes_of_lower_layers_are_allowed(self):
-        self.assertEqual(found({"compiler/driver/a.cpp": '#include "autoschedule/b.h"\n#include "graph/c.h"\n'}, LAYERS), [])
+        self.assertEqual(found({"compiler/driver/a.cpp": '#include "transform/b.h"\n#include "graph/c.h"\n'}, LAYERS), [])
 
     def test_the_autoscheduler_may_not_include_the_driver(self):
-        self.assertEqual(found({"compiler/autoschedule/a.cpp": '\n#include "driver/schedule.h"\n'}, LAYERS),
-                         ["compiler/autoschedule/a.cpp:2: autoschedule may not include driver/schedule.h"])
+        self.assertEqual(found({"compiler/transform/a.cpp": '\n#include "driver/schedule.h"\n'}, LAYERS),
+                         ["compiler/transform/a.cpp:2: transform may not include driver/schedule.h"])
 
     def test_code_in_process_may_not_include_the_autoscheduler(self):
-        self.assertEqual(found({"compiler/jit/a.h": '#include "autoschedule/default_schedule.h"\n'}, LAYERS),
-                         ["compiler/jit/a.h:1: jit may not include autoschedule/default_schedule.h"])
+        self.assertEqual(found({"compiler/jit/a.h": '#include "transform/size_estimate.h"\n'}, LAYERS),
+                         ["compiler/jit/a.h:1: jit may not include transform/size_estimate.h"])
 
     def test_only_the_front_end_calls_the_driver_through_its_interface(self):
         include = f'#include "{check_layers.INTERFACE}"\n'
         self.assertEqual(found({"compiler/frontend/run/a.cpp": include, "compiler/driver/a.cpp": include}, LAYERS), [])
-        self.assertEqual(found({"compiler/autoschedule/a.cpp": include}, LAYERS),
-                         [f"compiler/autoschedule/a.cpp:1: autoschedule may not call the compiler through "
+        self.assertEqual(found({"compiler/transform/a.cpp": include}, LAYERS),
+                         [f"compiler/transform/a.cpp:1: transform may not call the compiler through "
                           f"{check_layers.INTERFACE}"])
 
     def test_parts_of_the_planner_include_only_parts_before_them(self):

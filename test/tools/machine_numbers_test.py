@@ -37,7 +37,7 @@ class Findings(unittest.TestCase):
     def found(self, allowed):
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder)
-            for name in ("compiler/autoschedule/rule.cpp", "autoschedule/machine/machine.h"):
+            for name in ("compiler/transform/rule.cpp", "autoschedule/machine/machine.h"):
                 (root / name).parent.mkdir(parents=True)
                 (root / name).write_text("int a;\nconstexpr int  lanes = 16;  // of a vector\n")
             return list(check.findings(root, allowed))
@@ -45,14 +45,14 @@ class Findings(unittest.TestCase):
     def test_numbers_outside_of_the_description_of_machines_are_found(self):
         found = self.found({})
         self.assertEqual(len(found), 1)
-        self.assertIn("compiler/autoschedule/rule.cpp:2: `constexpr int lanes = 16;`", found[0])
+        self.assertIn("compiler/transform/rule.cpp:2: `constexpr int lanes = 16;`", found[0])
 
     def test_lines_on_the_list_are_allowed(self):
-        self.assertEqual(self.found({"compiler/autoschedule/rule.cpp: constexpr int lanes = 16;": "a reason"}), [])
+        self.assertEqual(self.found({"compiler/transform/rule.cpp: constexpr int lanes = 16;": "a reason"}), [])
 
     def test_a_line_on_the_list_that_is_gone_is_found(self):
-        found = self.found({"compiler/autoschedule/rule.cpp: constexpr int lanes = 16;": "a reason",
-                            "compiler/autoschedule/rule.cpp: constexpr int lanes = 8;": "a reason"})
+        found = self.found({"compiler/transform/rule.cpp: constexpr int lanes = 16;": "a reason",
+                            "compiler/transform/rule.cpp: constexpr int lanes = 8;": "a reason"})
         self.assertEqual(len(found), 1)
         self.assertIn("constexpr int lanes = 8;", found[0])
 

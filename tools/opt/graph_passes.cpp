@@ -4,6 +4,7 @@
 
 #include "autodiff/derivative.h"
 #include "autoschedule/rewrites/rewrites.h"
+#include "driver/plan_schedule.h"
 #include "driver/schedule.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
@@ -37,6 +38,12 @@ const std::vector<GraphPass>& graph_passes() {
        }},
       {"rewrites",
        [](const std::vector<FuncPtr>& outputs) { return planning::with_rewrites(outputs); }},
+      {"auto_schedule",
+       [](const std::vector<FuncPtr>& outputs) {
+         return driver::schedule_by_plan(graph::apply_wrappers(outputs), {},
+                                         driver::Scheduling::Everything)
+             .outputs;
+       }},
       {"schedule_unscheduled",
        [](const std::vector<FuncPtr>& outputs) { return driver::schedule_unscheduled(outputs); }}};
   return passes;

@@ -5,7 +5,7 @@
 //
 // The adjoint of an output is such a Func, and so is that of a stage which runs over a box. The gathers of a stencil
 // then form a stencil over a Func with zero padding, as a user would write the adjoint by hand. Loops are not split at
-// its borders, and rows may be packed with their zeros for register tiling (autoschedule/row_copies.h). Products are
+// its borders, and rows may be packed with their zeros for register tiling. Products are
 // strong (graph: strong_mul), so a zero stays zero beside infinity.
 //
 // Other factors may have the clamped place in remainders and conditions, as those of a transposed convolution do:

@@ -115,7 +115,7 @@ class PartSizes {
   double bytes_an_element() const { return total_bytes(types_); }
   // Whether the outermost loop goes from plane to plane of what is read, each of which belongs to one element, and each
   // element sums all of its planes: as the sum over pixels and images of a batch, for each channel. Then each plane is a
-  // part, so that what reads the same planes may run in the same loops (autoschedule/row_guests.h).
+  // part, so that what reads the same planes may run in the same loops.
   bool are_parts_planes(const Iterations& update) const {
     const Gather& g = update.over;
     const size_t count = update.rvars.size();

@@ -1,5 +1,5 @@
 // factored_program.h -- differentiates the program with costly factors of its sums as Funcs of their own
-// (autoschedule/invariant_factors.h).
+// (transform/invariant_factors.h).
 //
 // Primal:      f(x, y) += g(x, r) h(y, r)      with costly g and h, each a Func
 // Transposed:  g_adj(x, r) = sum over y of f_adj(x, y) h(y, r)

@@ -8,7 +8,7 @@
 // Transposed:                         a recurrence over F, whose last step has the adjoint after the update
 //
 // A predicate chooses between V and F[W(p), s]. Both F and its adjoint keep all steps, one below the other, and the
-// points of a step can run in parallel and in vectors (autoschedule/step_loops.h). A tape (tape.h) would run one by one.
+// points of a step can run in parallel and in vectors. A tape (tape.h) would run one by one.
 #pragma once
 
 #include "autodiff/updates/update_context.h"

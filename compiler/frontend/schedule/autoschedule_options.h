@@ -20,19 +20,18 @@ namespace retrograde {
 
 class Func;
 
-// The autoscheduler's optional decisions. It always chooses which Funcs to compute at root, vectorizes their rows and
-// splits their outermost loops into parallel chunks.
+// The autoscheduler's optional decisions. Without all of them it still chooses which Funcs are stored, and their vectors
+// and parallel loops (docs/autoscheduler.md).
 enum class Decision : uint8_t {
-  ScatterStrategy,  // scatters at data-dependent indices: layout, vector lanes and unrolled taps
+  ScatterStrategy,  // scatters at data-dependent indices: vector lanes; on GPUs, atomic updates
   CutReductions,    // split reductions to few elements: lanes, and rows as parallel chunks
   RegisterTiles,    // register tiling of reductions
-  LayoutStaging,  // packed copies of strided operands, square tiles of transposed reads, planes that
-                  // share data-dependent indices, sums along the rows of their operands
-  JoinSweeps,     // fusion of the loops of reductions that load the same values
-  Slices,         // Funcs with a single consumer that reads slice by slice, computed in its loops
-  TaskSizes,      // parallel loops inside a short outermost loop
-  Strips,         // chains of stencils in strips, with sliding windows of rows
-  Choices         // one copy of the body for each value of a small dimension that selects a case
+  LayoutStaging,    // copies of operands, and the order of dimensions in memory
+  JoinSweeps,       // fusion of the loops of stages that load the same values
+  Slices,           // Funcs computed in the loops of their consumers; the same as Strips
+  TaskSizes,        // parallel loops inside of other parallel loops
+  Strips,           // Funcs computed in the loops of their consumers; the same as Slices
+  Choices           // unrolled loops outside of register tiles
 };
 // All decisions, in the order of the enumeration.
 const std::vector<Decision>& all_decisions();
@@ -56,23 +55,22 @@ struct AutoscheduleOptions {
   std::set<Decision> without = {};     // decisions that it does not make
   std::vector<FuncName> store = {};    // Funcs to compute at root
   std::vector<FuncName> inlined = {};  // Funcs to inline
-  // Number of threads to schedule for. Parallel loops are split into four chunks per thread, 8 at least; with
-  // one thread no loop is parallel. 0: the parallelism of the MachineParams unless these are the generic
-  // ones; otherwise 8 chunks.
+  // Number of threads to schedule for: four parallel chunks per thread are wanted, 8 at least; with one thread no loop
+  // is parallel. 0: the parallelism of the MachineParams unless these are the generic ones; otherwise 8 chunks.
   int threads = 0;
   // Maximum bytes alive at once in a call, inputs and outputs included. If the schedule would exceed it,
   // Funcs are recomputed instead of stored, as far as possible. Unknown sizes count as 0. 0 means: inputs,
   // outputs, twice the largest Func of the differentiated program, and everything that fits the caches; then
-  // no Func is recomputed if that takes much longer than its memory round trip.
+  // the program takes at most 25 % longer to keep within it, as predicted.
   int64_t memory_budget = 0;
-  // Searches wider than the default: a beam over changes of the whole schedule, from that of the rules and from one
-  // in which nothing is decided, guided by a cost model (docs/autoscheduler.md). It takes up to seconds, needs sizes
-  // that are known or estimated, and never chooses a schedule that the model predicts to be slower. The result
-  // depends only on the program, the options and the figures of the machine. Its last bits may differ from those of
-  // the default schedule, and from those on another machine or for another number of threads.
+  // Searches wider than the default: a beam over changes of the whole schedule, guided by a cost model
+  // (docs/autoscheduler.md). It takes up to seconds, needs sizes that are known or estimated, and never chooses a
+  // schedule that the model predicts to be slower. The result depends only on the program, the options and the
+  // figures of the machine. Its last bits may differ from those of the default schedule, and from those on another
+  // machine or for another number of threads.
   bool search = false;
-  // false: scatters at data-dependent indices may become parallel atomic() updates, if that takes less memory
-  // or is the only source of parallelism. Results may then differ in the last bits from run to run.
+  // false: large scatters at data-dependent indices may become parallel atomic() updates, if that is the only source
+  // of parallelism. Results may then differ in the last bits from run to run.
   bool deterministic = true;
 
   // Whether all options are equal.
