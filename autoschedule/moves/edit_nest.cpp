@@ -2,6 +2,7 @@
 #include <functional>
 #include <map>
 #include <tuple>
+#include <utility>
 
 #include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
@@ -92,9 +93,14 @@ bool has_loops(const Plan& plan, FuncId func) {
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func) {
   std::vector<StageId> result;
   std::vector<FuncId> read{func};
+  std::vector<uint64_t> seen(plan.funcs.size());  // by Func, a bit for each of its first stages
   for (size_t i = 0; i < read.size(); ++i) {
     for (const StageId reader : context.accesses.consumers(read[i])) {
-      if (std::ranges::find(result, reader) != result.end()) continue;
+      uint64_t& stages = seen[static_cast<size_t>(reader.func)];
+      const uint64_t own = uint64_t{1} << std::min<int>(reader.stage, 63);
+      const bool may_be_known = std::exchange(stages, stages | own) & own;
+      if (may_be_known && (reader.stage < 63 || std::ranges::find(result, reader) != result.end()))
+        continue;
       result.push_back(reader);
       if (is_inlined(plan, reader.func)) read.push_back(reader.func);
     }

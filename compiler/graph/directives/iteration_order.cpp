@@ -176,11 +176,10 @@ void check_reduction_order(const SchedulePlace& at, const std::vector<Dim>& dims
   const StageLoops& now = at.schedule();
   if (reduction_loops(now.dims) == reduction_loops(dims)) return;
   check_concurrent_loops(at, dims, asked);
+  if (stores_one_value(f, definition) || can_prove_commutative(f, definition)) return;
   const std::vector<std::string> before = dependent_loops(f, definition, now, now.dims);
   const std::vector<std::string> after = dependent_loops(f, definition, now, dims);
-  if (before == after || stores_one_value(f, definition) || can_prove_commutative(f, definition) ||
-      keeps_order_of_accesses(f, definition, now, dims))
-    return;
+  if (before == after || keeps_order_of_accesses(f, definition, now, dims)) return;
   size_t i = 0;
   while (i < before.size() && i < after.size() && before[i] == after[i]) i++;
   const bool in_new = i < after.size();
