@@ -291,7 +291,11 @@ class TrafficWalk {
       recent_ = before;
     }
     times *= node.trips * (1 - kept);
-    for (const int child : node.children) visit(child, times);
+    for (const int child : node.children) {
+      // Copies load what they have in common once.
+      const bool is_copied = group_.nodes[static_cast<size_t>(child)].kind == ForType::Unrolled;
+      is_copied ? load(regions_.run(child), times, child, true) : visit(child, times);
+    }
     if (!node.stages.empty()) load(regions_.own(n), times, n, true);
     held_.resize(held);
     // All iterations have passed, not only those that were looked at.
