@@ -13,6 +13,7 @@
 // Legal: L4, L5, L6: iterations of a pure variable write different elements, and lowering runs lanes that may meet in
 // order. L2 holds without short loops: with copies of them, an element takes its terms in another order, so the update
 // commutes. Outputs keep their layout.
+// Not done: lanes along privatised copies, whose rows lie apart.
 #include <algorithm>
 #include <bit>
 
