@@ -84,6 +84,14 @@ class StageLoops {
     if (!is_vector(depends)) return 1;
     return std::max(1.0, std::ceil(lanes_.count * element_bytes / m_.vector_bytes));
   }
+  // The time of an instruction. Lanes that fill a part of a register take no more than their part of it, but narrow
+  // elements are widened sooner or later.
+  double lanes_ns(double element_bytes, double vector_ns, double scalar_ns) const {
+    if (lanes_.iterator < 0) return scalar_ns;
+    const double share =
+        std::min(1.0, lanes_.count * std::max(element_bytes, 4.0) / m_.vector_bytes);
+    return std::max(scalar_ns, vector_ns * share);
+  }
 
   // Whether each copy of the body has one point of these iterators.
   bool are_constants(IteratorSet iterators) const {

@@ -272,6 +272,20 @@ class TrafficWalk {
     return kept.size() == run.size();
   }
 
+  // Unrolled copies load once what each of them reads.
+  void load_for_copies(int n, double times) {
+    if (group_.nodes[static_cast<size_t>(n)].kind != ForType::Unrolled) return;
+    const Regions& one = regions_.iteration(n);
+    Regions shared = regions_.run(n);
+    std::erase_if(shared, [&](const Region& all) {
+      return all.is_stored || std::ranges::none_of(one, [&](const Region& region) {
+               return region.buffer == all.buffer && region.bytes == all.bytes;
+             });
+    });
+    load(shared, times, n, true);
+    for (const Region& region : shared) held_.push_back(region.buffer);
+  }
+
   void visit(int n, double times) {
     const LoopNode& node = group_.nodes[static_cast<size_t>(n)];
     times *= node.share;
@@ -292,7 +306,10 @@ class TrafficWalk {
       recent_ = before;
     }
     times *= node.trips * (1 - kept);
-    for (const int child : node.children) visit(child, times);
+    for (const int child : node.children) {
+      load_for_copies(child, times);
+      visit(child, times);
+    }
     if (!node.stages.empty()) load(regions_.own(n), times, n, true);
     held_.resize(held);
     // All iterations have passed, not only those that were looked at.

@@ -130,7 +130,8 @@ class StageWork : StageLoops {
     const double count = row.count * times(row.depends) * shared;
     instructions_ += count * vectors(row.element_bytes, row.depends);
     if (is_vector(row.depends))
-      units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
+      units_.arithmetic += count * vectors(row.element_bytes, row.depends) *
+                           lanes_ns(row.element_bytes, row.time.vector_ns, row.time.scalar_ns);
     else
       (row.time.is_integer ? units_.scalars : units_.arithmetic) += count * row.time.scalar_ns;
   }
@@ -192,8 +193,7 @@ class StageWork : StageLoops {
     const double crossing = moved.is_unaligned ? 1 + bytes / double(line_bytes) : 1;
     const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
     const double scalar_ns = std::min(vector_ns, (touch.writes ? 2 : 1) * m_.scalar_ns);
-    const double access_ns = lanes_.iterator >= 0 ? vector_ns : scalar_ns;
-    units += count * moved.vectors * crossing * access_ns;
+    units += count * moved.vectors * crossing * lanes_ns(touch.element_bytes, vector_ns, scalar_ns);
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }
 

@@ -13,9 +13,11 @@
 // Legal: L4, L5, L6: iterations of a pure variable write different elements, and lowering runs lanes that may meet in
 // order. L2 holds without short loops: with copies of them, an element takes its terms in another order, so the update
 // commutes. Outputs keep their layout.
+// Not done: lanes along privatised copies, whose rows lie apart.
 #include <algorithm>
 #include <bit>
 
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/covers.h"
 
@@ -50,6 +52,22 @@ bool adds_in_any_order(const Context& context, const StageNode& stage) {
   };
   return stage.id.stage > 0 && std::ranges::none_of(stage.reads, is_other) &&
          context.dependences.commutes(stage.id);
+}
+
+// Whether lanes along the dimension have nothing in common: they read rows that lie apart and add at places of their own.
+bool lie_apart(const Context& context, const StageNode& stage, int dimension) {
+  const auto found = std::ranges::find(stage.iterators, dimension, &Iterator::dimension);
+  const auto i = static_cast<int>(found - stage.iterators.begin());
+  const auto moves_place = [&](const IndexForm& form) {
+    const bool is_own = &form == &stage.write.index[static_cast<size_t>(dimension)];
+    return !is_own && (form.moved_by() & set_of(i)) != 0;
+  };
+  const auto is_row = [&](const Access& read) {
+    return lane_form(read, i, schedule_lanes, context.sizes, {line_elements}).kind ==
+           LaneForm::Kind::Contiguous;
+  };
+  return std::ranges::any_of(stage.write.index, moves_place) &&
+         std::ranges::none_of(stage.reads, is_row);
 }
 
 bool is_pure_in_all_stages(const Context& context, FuncId func, int dimension) {
@@ -231,7 +249,9 @@ std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& co
   });
   int dimensions = 0;
   for (int d = 0; d < static_cast<int>(extents.size()) && dimensions < most_dimensions; ++d) {
-    if (!is_pure_in_all_stages(context, func, d)) continue;
+    const auto are_apart = [&](const StageNode& stage) { return lie_apart(context, stage, d); };
+    if (!is_pure_in_all_stages(context, func, d) || std::ranges::any_of(stages, are_apart))
+      continue;
     ++dimensions;
     add(plans, along_dimension(plan, func, context, plan.of(func), d, extents));
     if (has_slices) add(plans, in_slices(plan, func, context, d));

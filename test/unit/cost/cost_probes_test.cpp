@@ -52,6 +52,14 @@ TEST_F(CostProbes, ACopyMovesEachLineThreeTimes) {
   EXPECT_EQ(copy.bound_by(), "memory");
 }
 
+TEST_F(CostProbes, HalfAVectorMovesHalfTheBytes) {
+  out(x, y) = in(x, y) + other(x, y);
+  const Cost cost = cost_of("out  root  y, x:8, vector x\n");
+  // No less than scalars: a sum, two loads and a store of 0.12, 0.24 and 0.24 ns, of which the loop hides three quarters.
+  const double vector_ns = 0.3 + 0.25 * (0.12 + 0.24 + 0.24);
+  EXPECT_NEAR(cost.stages[0].compute_seconds, columns * rows / 8 * vector_ns * 1e-9, 10 * micro);
+}
+
 TEST_F(CostProbes, ThreadsShareTheBandwidthOfMemory) {
   out(x, y) = in(x, y);
   const Cost cost = cost_of("out  root  parallel y, x:16, vector x\n");
@@ -246,6 +254,17 @@ TEST_F(CostProbes, RowsThatShareSetsEvictEachOther) {
     return cost.stages[0].bytes[1] / (width * 512);
   };
   EXPECT_GT(lines_of(1024), 5 * lines_of(1040));
+}
+
+TEST_F(CostProbes, CopiesLoadOnceWhatTheyShare) {
+  Func copy("copy");
+  copy(x, y, c) = in(x, y) * c;
+  copy.set_estimate(x, 0, 1024).set_estimate(y, 0, 512).bound(c, 0, 4);
+  in.dim(0).set_estimate(0, 1024);
+  in.dim(1).set_estimate(0, 512);
+  const Cost cost = priced(copy, "copy  root  (y, x, c)  y:16, x, unroll c, vector y\n");
+  const double lines_bytes = 64 * 1024 * 512;  // one for each element, as sixteen rows share a set
+  EXPECT_NEAR(cost.stages[0].bytes[1], lines_bytes, 0.1 * lines_bytes);
 }
 
 // 64 rows of 256 bytes. 4112 bytes apart, they begin in 1008 bytes of sets and end 256 bytes later.
