@@ -91,12 +91,13 @@ class BufferFinder {
   }
 
   // A small array becomes registers if its indices are constants, and its vectors are loaded as they were stored: no loop
-  // inside of its allocation but unrolled ones and vectors moves them.
+  // inside of its allocation but unrolled ones and vectors moves them. Reads that are clamped need a box of any size.
   double register_share(const StoredBuffer& stored, const Touch& written) const {
     for (const StageRun& run : group_.runs) {
       for (const Touch& touch : run.facts->touches) {
         if (touch.buffer != written.buffer || touch.moved == 0) continue;
-        if (run.place > stored.inside) return 0;
+        if (run.place > stored.inside || std::ranges::any_of(touch.sides, &TouchedSide::is_clamped))
+          return 0;
         const LaneMoves moved = lane_moves(touch, stored.layout, run.nest.lanes, 1);
         if (moved.is_by_lane || moved.is_shifted || moved.shuffles > 0) return 0;
         for (size_t k = stored.inside; k < run.path.size(); ++k) {

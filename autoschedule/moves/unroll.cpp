@@ -4,6 +4,7 @@
 //   y, x:16, r.x, vector x        =>     y, x:16, unroll r.x, vector x              if r.x has few iterations
 //   y, unroll r.x, vector x       =>     y, r.x, vector x
 //   c, y, x:16, vector x          =>     y, c:3, x:16, unroll c, vector x           a dimension of few values
+//   c, y, x:16, vector x          =>     c:2, y, x:16, unroll c, vector x           channels of a warp
 //
 // Legal: L2, since the order of all iterations stays, or that of a pure loop changes (L1), and L4: the extent of an unrolled
 // loop is a step outside of it, or a constant of the reduction; L5.
@@ -27,6 +28,17 @@ bool shares_values(const StageNode& stage, int iterator) {
                              [&](const Access& read) { return !(read.moved_by() & own); }) ||
          std::ranges::any_of(stage.operations, [&](const OperationCount& operation) {
            return !(operation.depends & own);
+         });
+}
+
+// Whether all points of the iterator share data-dependent indices, which differ from lane to lane.
+bool shares_places(const StageNode& stage, const Nest& nest, int iterator) {
+  const std::optional<size_t> lanes = vector_loop(nest);
+  return lanes && std::ranges::any_of(stage.reads, [&](const Access& read) {
+           IteratorSet data = 0;
+           for (const IndexForm& index : read.index) data |= index.data_loops();
+           return (data & set_of(nest.loops[*lanes].iterator)) && !(data & set_of(iterator)) &&
+                  (read.moved_by() & set_of(iterator));
          });
 }
 
@@ -62,27 +74,34 @@ std::vector<Nest> with_larger_body(const StageLoops& loops) {
   return steps;
 }
 
-// The nests in which all values of a dimension that has few are part of the body, around its lanes.
-std::vector<Nest> with_short_dimensions(const StageLoops& loops) {
+// The nests in which points of a dimension that is no innermost one are part of the body, around its lanes: all that it
+// has, or a few of more if they share the places of gathers.
+std::vector<Nest> with_points_of_dimensions(const StageLoops& loops) {
   const auto& [plan, context, stage, nest, extents] = loops;
-  const size_t shared = shared_loops(plan, stage);
   std::vector<Nest> nests;
-  for (size_t d = shared; d < body_depth(nest); ++d) {
-    const Loop& loop = nest.loops[d];
-    const int64_t count = extents[static_cast<size_t>(loop.iterator)];
-    const bool is_alone = loop.step == 1 && outer_step(nest, loop.iterator, 1) == 0;
-    if (!is_alone || count < 2 || count > most_copies || body_depth(nest) == 1 ||
-        is_reduction(context, stage, loop.iterator) ||
-        !shares_values(context.accesses.stage(stage), loop.iterator))
-      continue;
+  const auto add = [&](size_t d, int64_t points, bool is_whole) {
+    const Loop loop = nest.loops[d];
     Nest inside = nest;
-    const bool was_parallel = loop.kind == ForType::Parallel;
     inside.loops.erase(inside.loops.begin() + static_cast<std::ptrdiff_t>(d));
     const size_t body = body_depth(inside);
     insert_step(inside, loop.iterator, 1, body, ForType::Unrolled);
-    insert_step(inside, loop.iterator, count, body - 1);
-    if (was_parallel) run_in_parallel(inside, context, stage);
+    insert_step(inside, loop.iterator, points, is_whole ? body - 1 : d,
+                is_whole ? ForType::Serial : loop.kind);
+    if (is_whole && loop.kind == ForType::Parallel) run_in_parallel(inside, context, stage);
     nests.push_back(std::move(inside));
+  };
+  const size_t body = body_depth(nest);
+  for (size_t d = shared_loops(plan, stage); d < body; ++d) {
+    const Loop& loop = nest.loops[d];
+    const int64_t count = extents[static_cast<size_t>(loop.iterator)];
+    const bool is_alone = loop.step == 1 && outer_step(nest, loop.iterator, 1) == 0;
+    if (!is_alone || count < 2 || body == 1 || is_reduction(context, stage, loop.iterator) ||
+        !shares_values(context.accesses.stage(stage), loop.iterator))
+      continue;
+    if (count <= most_copies) add(d, count, true);
+    const bool shares =
+        d + 1 < body && shares_places(context.accesses.stage(stage), nest, loop.iterator);
+    for (int64_t n = 2; shares && n <= most_copies && 2 * n <= count; n *= 2) add(d, n, false);
   }
   return nests;
 }
@@ -90,7 +109,7 @@ std::vector<Nest> with_short_dimensions(const StageLoops& loops) {
 std::vector<Nest> unrolled(const StageLoops& loops) {
   const auto& [plan, context, stage, nest, extents] = loops;
   std::vector<Nest> nests = with_larger_body(loops);
-  std::ranges::move(with_short_dimensions(loops), std::back_inserter(nests));
+  std::ranges::move(with_points_of_dimensions(loops), std::back_inserter(nests));
   std::erase_if(nests, [&](const Nest& larger) {
     return body_operations(plan, context, stage, larger, extents) > most_body_operations;
   });

@@ -38,6 +38,7 @@ class FunctionGenerator {
   void make(const ir::For& s);
   void make(const ir::Allocate& s);
   void make(const ir::IfThenElse& s);
+  void keep_in_memory(const Stmt& read_by);
   void serial_loop(const ir::For& s);
   bool fits_stack(const ir::Allocate& s, int64_t elements) const;
   Storage allocate_on_stack(const ir::Allocate& s, int64_t elements);

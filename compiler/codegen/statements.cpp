@@ -1,4 +1,9 @@
 // Code for functions, loops, branches, allocations and assertions.
+#include <llvm/IR/InlineAsm.h>
+#include <llvm/IR/MDBuilder.h>
+
+#include <set>
+
 #include "codegen/cpu/long_functions.h"
 #include "codegen/function_generator.h"
 #include "codegen/memory/access.h"
@@ -94,12 +99,36 @@ void FunctionGenerator::make(const Assert& s) {
   c_.fail_unless(condition, [&] { return values_.of(s.error); });
 }
 
+// Code for values that are not numbers rarely runs: registers are for the code around it.
+static bool is_unlikely(const Expr& condition) {
+  return ir::any_node(condition, [](const Expr& e) { return as_op(e, Op::is_nan) != nullptr; });
+}
+
+// Arrays on the stack that unlikely code reads stay in memory. In registers, they would take those of the loops before it.
+void FunctionGenerator::keep_in_memory(const Stmt& read_by) {
+  std::set<std::string> read, written;
+  walk(
+      read_by, [&](const ir::Load& load) { read.insert(load.name); },
+      [&](const ir::Store& store) { written.insert(store.name); });
+  for (const std::string& name : read) {
+    const auto found = c_.frame.storages.find(name);
+    if (written.contains(name) || found == c_.frame.storages.end()) continue;
+    Value* array = found->second.base;
+    if (!llvm::isa<llvm::AllocaInst>(array->stripPointerCasts())) continue;
+    auto* type = llvm::FunctionType::get(b_.getVoidTy(), {array->getType()}, false);
+    b_.CreateCall(llvm::InlineAsm::get(type, "", "r,~{memory}", true), {array});
+  }
+}
+
 void FunctionGenerator::make(const IfThenElse& s) {
   Value* condition = values_.alone(s.condition);
   llvm::BasicBlock *then_block = c_.new_block("then"), *after = c_.new_block("after");
   llvm::BasicBlock* else_block = s.when_false.defined() ? c_.new_block("else") : after;
-  b_.CreateCondBr(condition, then_block, else_block);
+  llvm::MDBuilder weights(c_.e.context());
+  b_.CreateCondBr(condition, then_block, else_block,
+                  is_unlikely(s.condition) ? weights.createUnlikelyBranchWeights() : nullptr);
   b_.SetInsertPoint(then_block);
+  if (is_unlikely(s.condition)) keep_in_memory(s.when_true);
   statement(s.when_true);
   b_.CreateBr(after);
   if (s.when_false.defined()) {

@@ -427,6 +427,33 @@ TEST(CodegenStatement, IfThenElseEvaluatesOneArm) {
   EXPECT_EQ(out.data<int32_t>()[0], 9);
 }
 
+TEST(CodegenStatement, ArraysOfUnlikelyCodeStayInMemory) {
+  const Expr value = make_load(Float(32), "in", 0);
+  const auto branch_on = [&](const Expr& condition) {
+    LoweredFunction f;
+    f.name = "unlikely";
+    f.args = {input("in", Float(32)), output("out", Float(32))};
+    const Stmt fill = make_store("first", value + 1, 0), use = make_store("out", value * 2, 0);
+    const Stmt again = make_if(condition, make_store("out", make_load(Float(32), "first", 0), 0));
+    f.body = make_allocate("first", Float(32), MemoryType::Stack, make_const(Int(64), 4),
+                           make_block({fill, use, again}));
+    return f;
+  };
+  // An instruction that may access the array.
+  const auto is_kept = [](const LoweredFunction& f) {
+    codegen::Options options;
+    options.target = test_target();
+    return codegen::compile_llvm_ir(f, options).find("~{memory}") != std::string::npos;
+  };
+  EXPECT_FALSE(is_kept(branch_on(value < 0)));
+  const LoweredFunction unlikely = branch_on(call_op(Op::is_nan, Bool(), {value}));
+  EXPECT_TRUE(is_kept(unlikely));
+  Array in(Float(32), 1), out(Float(32), 1);
+  in.data<float>()[0] = 3;
+  ASSERT_EQ(call(unlikely, {&in, &out}), 0);
+  EXPECT_EQ(out.data<float>()[0], 6);
+}
+
 TEST(CodegenStatement, StatementsReloadWhatWasStored) {
   // Both stores share one load node; the second must see the first store.
   LoweredFunction f;

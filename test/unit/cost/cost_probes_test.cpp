@@ -399,6 +399,22 @@ TEST_F(CostProbes, ShiftedVectorsComeFromMemory) {
             loads_of(rows_sum(x, y) + 1) + columns * rows / 16 * 0.4e-9);
 }
 
+// A border cuts a box that clamped reads need, so that nothing but memory has its size: each slice is waited for.
+TEST_F(CostProbes, ClampedReadsComeFromMemory) {
+  rows_sum(x, y) = in(x, y) * 2;
+  const auto ns_of_slice = [&](const Expr& place) {
+    Func shifted("shifted");
+    shifted(x, y) = rows_sum(place, y) + 1;
+    shifted.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    const Cost cost = priced(shifted,
+                             "shifted  root  y, x:16, vector x\n"
+                             "rows_sum  at shifted/x:16  y, unroll x:16, vector x\n");
+    return 1e9 * compute_seconds(cost) / (columns * rows / 16);
+  };
+  EXPECT_LT(ns_of_slice(x), 3);
+  EXPECT_GT(ns_of_slice(clamp(x, 0, 4000)), slice_iterations * 0.3);
+}
+
 // Rows of 4100 elements: most vectors cross a line, so that a load counts twice. Stores take 0.35 ns, an iteration 0.3 ns.
 TEST_F(CostProbes, RowsOfOddLengthShiftTheirVectors) {
   const auto ns_of = [&](int length) {
