@@ -54,7 +54,7 @@ std::vector<const char*> moves_of(Decision decision) {
       return {"fuse_stages", "share_loops", "fuse_readers"};
     case Decision::Slices:
     case Decision::Strips:
-      return {"compute_at", "compute_in_tile", "slide"};
+      return {"compute_at", "compute_in_tile", "compute_in_reduction", "slide"};
     case Decision::TaskSizes:  // see keep_outermost_tasks
       return {};
     case Decision::Choices:
