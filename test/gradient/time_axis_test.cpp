@@ -277,7 +277,7 @@ TEST(TimeAxis, MemoryIsThatOfTheKeptSlices) {
                        start);
   };
   int64_t ten = peak(500, 10);
-  EXPECT_LT(ten, 20 * 400);
+  EXPECT_LT(ten, 24 * 400);
   EXPECT_EQ(peak(1000, 10), ten);
   EXPECT_EQ(peak(500, 20), ten + 10 * 400);
 }

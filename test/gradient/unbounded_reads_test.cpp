@@ -102,8 +102,7 @@ TEST_F(UnboundedReads, OfFuncsWithUpdatesAreNamedInTheError) {
   counts(clamp(cast<int>(flow(r.x, r.y)), 0, 3)) += image(r.x, r.y);
   read(x, y) = counts(cast<int>(flow(x, y)));
   const Derivative d = propagate_adjoints(weighted_sum(read, {n, n}));
-  expect_error({"cannot compute the adjoint of \"unbounded_counts\"",
-                "where the program reads \"unbounded_counts\""},
+  expect_error({"cannot compute", "\"unbounded_counts\"", "Clamp the index that depends on data"},
                [&] {
                  d(image).realize({n, n});
                });
