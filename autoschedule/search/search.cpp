@@ -5,6 +5,9 @@
 #include <memory>
 #include <unordered_set>
 
+#include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/nest.h"
+
 namespace retrograde::planning {
 
 namespace {
@@ -217,6 +220,27 @@ class Beam {
 
 }  // namespace
 
+namespace {
+
+// Whether each stage has loops of its own, as they are defined, of which only those of rows are split: into vectors.
+bool runs_along_rows(const graph::FuncContents& f, const FuncPlan& plan) {
+  for (size_t s = 0; s < plan.nests.size(); ++s) {
+    const Nest& nest = plan.nests[s];
+    const std::optional<size_t> lanes = moves::vector_loop(nest);
+    std::vector<int16_t> order, defined;
+    for (size_t d = 0; d < nest.loops.size(); ++d) {
+      if (nest.loops[d].kind == ForType::Unrolled) return false;
+      if (!lanes || d != *lanes) order.push_back(nest.loops[d].iterator);
+    }
+    for (const Loop& loop : loops_of_definition(f, static_cast<int>(s)).loops)
+      defined.push_back(loop.iterator);
+    if (nest.shared_with || !nest.fusions.empty() || order != defined) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 bool keeps_funcs(const Plan& before, const Plan& after, const SearchOptions& options) {
   const auto is_set = [](const std::vector<bool>& by_func, size_t f) {
     return f < by_func.size() && by_func[f];
@@ -226,6 +250,9 @@ bool keeps_funcs(const Plan& before, const Plan& after, const SearchOptions& opt
     const bool is_alike = was.storage == is.storage && was.nests == is.nests;
     if (is_set(options.kept, f) && before.funcs[f] != after.funcs[f] && !is_alike) return false;
     if (is_set(options.at_root, f) && is.placement.compute.kind != Level::Kind::Root) return false;
+    if (is_set(options.in_rows, f) && was.nests != is.nests &&
+        !runs_along_rows(*after.program->funcs[f], is))
+      return false;
   }
   return true;
 }

@@ -31,6 +31,7 @@ struct SearchOptions {
   double most_bytes = std::numeric_limits<double>::infinity();
   std::vector<bool> kept = {};     // by Func: no move changes how it runs
   std::vector<bool> at_root = {};  // by Func: it stays at root
+  std::vector<bool> in_rows = {};  // by Func: it runs along its rows, without tiles
   std::set<std::string> without;   // names of moves that are not made
   // A change must gain these parts of the time of the stages that change and of the whole time; less of that in programs of
   // more than 100 Funcs. The defaults are about the error of the cost, for a start that is known to be fast.

@@ -96,6 +96,7 @@ PlannedSchedules::PlannedSchedules(const std::vector<FuncPtr>& outputs,
   search.width = width;
   search.spare_bytes = static_cast<int64_t>(std::max(budget_bytes_ - callers_bytes_, 0.0));
   search.must_fit = options.memory_budget > 0;
+  search.threads = options.threads;
   search.what = what;
   search.device = device;
   const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites, accesses);

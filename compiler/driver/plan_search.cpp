@@ -9,9 +9,11 @@
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/search/fit_memory.h"
 #include "autoschedule/search/start.h"
+#include "autoschedule/search/tasks.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
+#include "transform/step_sums.h"
 #include "transform/stored_funcs.h"
 
 namespace retrograde::driver {
@@ -132,8 +134,18 @@ PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<Fun
                                   dependences, search.device, atomics_of(options)};
   planning::SearchOptions beam;
   beam.kept = kept_funcs(given, kept_names(unscheduled, options, search.what));
-  for (size_t i = 0; i < beam.kept.size(); ++i)
-    beam.at_root.push_back(!beam.kept[i] && is_among(given.program->funcs[i], options.store));
+  // The cost does not know that lowering keeps a few steps where these are at root.
+  const transform::StepSums steps =
+      search.device ? transform::StepSums()
+                    : transform::step_sums(outputs, transform::SizeEstimate(outputs));
+  for (size_t i = 0; i < beam.kept.size(); ++i) {
+    const FuncPtr& f = given.program->funcs[i];
+    const bool is_sum = steps.sums.contains(f.get());
+    const bool has_steps = steps.steps.contains(f.get());
+    const bool is_wanted = is_among(f, options.store) || is_sum || (has_steps && !f->is_pure());
+    beam.at_root.push_back(!beam.kept[i] && is_wanted);
+    beam.in_rows.push_back(!beam.kept[i] && (is_sum || has_steps));
+  }
   beam.without = search.without;
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
@@ -153,6 +165,14 @@ PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<Fun
     const double most_seconds = search.must_fit ? std::numeric_limits<double>::infinity()
                                                 : worth_fitting * found.cost.seconds;
     found = planning::fit_memory(std::move(found), context, cost, beam, most_seconds);
+    if (search.threads > 0 && search.threads != machine.threads) {
+      planning::Machine threaded = machine;
+      threaded.threads = search.threads;
+      planning::CostModel cost_of_tasks(accesses, sizes, threaded, search.device);
+      const planning::Context of_tasks{accesses,    sizes,         threaded,
+                                       dependences, search.device, atomics_of(options)};
+      found.plan = planning::with_tasks(std::move(found.plan), beam.kept, of_tasks, cost_of_tasks);
+    }
     if (options.without.contains(Decision::TaskSizes)) keep_outermost_tasks(found.plan, beam.kept);
   }
   return result;

@@ -28,6 +28,7 @@ struct PlanSearchOptions {
   int width = 1;
   int64_t spare_bytes = 0;  // that may be alive at once
   bool must_fit = false;    // however slow the program gets
+  int threads = 0;          // for which parallel loops are chosen; 0: those of the machine
   Scheduling what = Scheduling::Everything;
   std::set<std::string> without = {};         // moves that are not made
   planning::AccessGraph* accesses = nullptr;  // of a program like this one, which is taken

@@ -11,7 +11,6 @@ ScheduleRequest request_for(const Target& target, const AutoscheduleOptions& opt
       static_cast<double>(params.last_level_cache_size);
   if (options.threads <= 0 && params != MachineParams::generic())
     request.options.threads = std::max(params.parallelism, 0);
-  if (request.options.threads > 0) request.machine.threads = request.options.threads;
   return request;
 }
 

@@ -13,7 +13,8 @@
 namespace retrograde::driver {
 
 struct ScheduleRequest {
-  planning::Machine machine = {};  // with the threads of the options
+  planning::Machine machine =
+      {};  // with the reference threads, so that those of the options decide no bit
   AutoscheduleOptions options = {};
   planning::Device device = {};
   // All of a pipeline is scheduled for a device: its stages are kernels (autoschedule/moves/kernels.cpp).

