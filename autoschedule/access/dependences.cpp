@@ -312,29 +312,6 @@ Dependences::Known& Dependences::known(StageId stage) {
 
 const StageDependences& Dependences::of(StageId stage) { return known(stage).forms; }
 
-namespace {
-
-constexpr size_t most_clamps = 5;  // of an access
-
-// The average number of minima and maxima in the coordinates of an access. A proof looks at the cases of each.
-size_t clamps_of_an_access(const FuncContents& f, const Definition& update) {
-  size_t clamps = 0;
-  const auto count = [&](const std::vector<Expr>& coordinates) {
-    for (const Expr& e : coordinates) {
-      walk(e, [&](const Expr& part) {
-        clamps += part.kind() == Kind::Min || part.kind() == Kind::Max;
-        return true;
-      });
-    }
-  };
-  const std::vector<Expr> reads = graph::own_reads(f, update);
-  count(update.args);
-  for (const Expr& read : reads) count(read.as<Call>()->args);
-  return clamps / (reads.size() + 1);
-}
-
-}  // namespace
-
 bool Dependences::may_run_at_once(StageId stage, int iterator, IteratorSet around) {
   const auto [answer, is_new] = known(stage).at_once.try_emplace({iterator, around}, false);
   if (is_new) answer->second = can_prove_at_once(stage, iterator, around);
@@ -352,19 +329,14 @@ bool Dependences::can_prove_at_once(StageId stage, int iterator, IteratorSet aro
                           StageDependences(graph_, stage, false).are_independent(iterator, around));
   if (is_proven) return true;
   const FuncContents& f = *graph_.func(stage.func).func;
-  const std::vector<Iterator>& iterators = node.iterators;
   const Definition& update = f.stage(stage.stage);
-  const auto is_moved = [&](const Expr& place) {
-    return uses_variable(place, iterators[static_cast<size_t>(iterator)].name);
-  };
-  // All iterations update one element, or a proof takes long and seldom succeeds.
-  if (std::ranges::none_of(update.args, is_moved) || clamps_of_an_access(f, update) > most_clamps)
-    return false;
+  const std::string& name = node.iterators[static_cast<size_t>(iterator)].name;
+  const auto is_moved = [&](const Expr& place) { return uses_variable(place, name); };
+  // Otherwise all iterations update one element.
+  if (std::ranges::none_of(update.args, is_moved) || has_many_clamps(f, update)) return false;
   std::unordered_set<std::string> names;
-  for (size_t i = 0; i < iterators.size(); ++i) {
-    if (around & set_of(static_cast<int>(i))) names.insert(iterators[i].name);
-  }
-  const std::string& name = iterators[static_cast<size_t>(iterator)].name;
+  for (size_t i = 0; i < node.iterators.size(); ++i)
+    if (around & set_of(static_cast<int>(i))) names.insert(node.iterators[i].name);
   return can_prove_race_free(f, update, name, names);
 }
 

@@ -261,6 +261,23 @@ bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
   });
 }
 
+bool has_many_clamps(const FuncContents& f, const Definition& update) {
+  constexpr size_t many = 6;
+  size_t clamps = 0;
+  const auto count = [&](const std::vector<Expr>& coordinates) {
+    for (const Expr& e : coordinates) {
+      walk(e, [&](const Expr& part) {
+        clamps += part.kind() == Kind::Min || part.kind() == Kind::Max;
+        return true;
+      });
+    }
+  };
+  const std::vector<Expr> reads = own_reads(f, update);
+  count(update.args);
+  for (const Expr& read : reads) count(read.as<Call>()->args);
+  return clamps / (reads.size() + 1) >= many;
+}
+
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {
   const AssociativityProof proof = prove_associative(f, update);
   return proof.op && proof.op->commutative && !proof.op->breaks_ties;

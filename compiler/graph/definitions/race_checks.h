@@ -44,6 +44,10 @@ bool can_prove_same_order(const FuncContents& f, const Definition& update,
 bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
                             const std::string& inner, const std::string& outer, int slope);
 
+// Whether the coordinates of an access have so many minima and maxima, on average, that a proof over the cases of each
+// would take long and seldom succeed.
+bool has_many_clamps(const FuncContents& f, const Definition& update);
+
 // Whether all points of the update commute: it is f(same point) op e with an operator that is
 // proven associative and commutative, for ties too. Floats are included, although reordering
 // changes the rounding of their sums. False means unknown.

@@ -3,7 +3,7 @@ import re
 
 from api.cpp_text import TOKEN, arguments, one_line, pieces, unescape, without_comments
 
-FOLDERS = ["graph", "frontend", "generator", "autoschedule", "autodiff", "checks", "lower", "ir", "jit", "aot"]
+FOLDERS = ["graph", "frontend", "generator", "transform", "driver", "autodiff", "checks", "lower", "ir", "jit", "aot"]
 # IR text is for tools and tests; its errors are one rule per position in a text.
 INTERNAL_FILES = {"ir/lexer.cpp", "ir/parse_expr.cpp"}
 # Functions that raise an error: the index of the rule among their arguments, and the kind of error.
