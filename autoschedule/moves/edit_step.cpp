@@ -29,7 +29,9 @@ bool has_smaller_step(const Nest& nest, int depth, int inner_depth) {
   return std::ranges::find(first + 1, last, first->iterator, &Loop::iterator) != last;
 }
 
+// Funcs whose loops no plan describes have no nests.
 bool runs_in(const Plan& plan, StageId stage, const LoopRef& own) {
+  if (static_cast<size_t>(stage.stage) >= plan.of(stage.func).nests.size()) return false;
   return plan.nest(stage).loops.size() > static_cast<size_t>(own.depth) &&
          owner_of(plan, {stage, own.depth}) == own.stage;
 }
