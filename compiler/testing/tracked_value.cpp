@@ -94,6 +94,8 @@ Value float_binary(Rounding rounding, Kind kind, const Value& a, const Value& b,
     if (kind == Kind::Mul || rounding == Rounding::Reordering) {
       error += rounding_residual(kind, a.scalar, b.scalar, result);
     }
+    // A sum that is exact in this order is rounded in others.
+    if (is_sum && rounding == Rounding::Reordering) error += ulp(result.type, result.f) / 2;
   } else if (kind == Kind::Div) {
     if (error > 0) error += ulp(result.type, result.f);
     if (rounding == Rounding::Reordering) error += 2 * ulp(result.type, result.f);

@@ -110,7 +110,7 @@ const LargeProgram all[] = {
     {"WarpInBothDirections", warp_in_both_directions, 32},
     {"WeightsOfAConvolution", weights_of_a_convolution, 32},
     {"GridOfABilateralSlice", grid_of_a_bilateral_slice, 6},
-    {"HistogramInColumnsThatMultiplies", histogram_in_columns_that_multiplies, test_side},
+    {"HistogramInColumnsThatMultiplies", histogram_in_columns_that_multiplies, test_side / 8},
     {"ScansOfRowsAndColumns", scans_of_rows_and_columns, test_side},
     // Less work than a parallel loop takes to start.
     {"LargestOfEachColumn", largest_of_each_column, 0},

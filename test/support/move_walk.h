@@ -159,6 +159,7 @@ class MoveWalk {
     unscheduled_ = graph::copy_graph(graph::apply_wrappers(outputs_of(program_))).outputs;
     if (c_.chance(50)) {
       // The schedule of gradients is the one that compiling gives, with its rewrites.
+      keeps_bits_ = false;
       const std::vector<graph::FuncPtr> outputs = driver::schedule_unscheduled(unscheduled_);
       plan_ = planning::import_plan(
           graph::apply_wrappers(driver::schedule_by_plan(graph::apply_wrappers(outputs), {},
