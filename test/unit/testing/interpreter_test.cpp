@@ -140,7 +140,8 @@ TEST(Interpreter, LongChainOfFuncsIsNoProblem) {
 TEST(TrackedValue, ExactArithmeticHasNoError) {
   Func f;
   f(x) = cast<float>(x) * 0.5f + 3.0f;
-  EXPECT_EQ(value_at(f, 5, Rounding::Reordering).error, 0);
+  EXPECT_EQ(value_at(f, 5, Rounding::Contraction).error, 0);
+  EXPECT_GT(value_at(f, 5, Rounding::Reordering).error, 0) << "another order may not be exact";
 }
 
 TEST(TrackedValue, BoundCoversContraction) {
