@@ -14,7 +14,8 @@
 //       write bins(v1)      v1(r.x) = hist(r.x): data decide the place, r.x moves it
 //
 // The graph is built once from the outputs of a program and never changes. Building it visits each node of the
-// definitions once, except those that are equal to ones of an earlier graph. It depends on definitions alone, not on directives, except that wrappers are Funcs like others.
+// definitions once, except those that are equal to ones of an earlier graph. It depends on definitions alone, not on
+// directives, except that wrappers are Funcs like others.
 #pragma once
 
 #include <cstdint>
@@ -110,7 +111,7 @@ struct FuncNode {
 class AccessGraph {
  public:
   AccessGraph() = default;
-  // `before`: a graph of a program of which most stages have the same names and definitions, or none. They are not read again.
+  // `before`: an earlier graph, or an empty one. Stages that have the same names and definitions there are not read again.
   AccessGraph(const std::vector<FuncPtr>& outputs, AccessGraph before);
   explicit AccessGraph(const std::vector<FuncPtr>& outputs) : AccessGraph(outputs, AccessGraph()) {}
 

@@ -20,12 +20,7 @@ namespace {
 
 // The update at root that alone reads the Func, perhaps through inlined ones, and shares no loops with other Funcs.
 std::optional<StageId> only_sum(const Plan& plan, const Context& context, FuncId func) {
-  std::optional<StageId> found;
-  for (const StageId reader : all_readers(plan, context, func)) {
-    if (is_inlined(plan, reader.func)) continue;
-    if (found) return std::nullopt;
-    found = reader;
-  }
+  const std::optional<StageId> found = only_reader(plan, context, func);
   if (!found || found->func == func || !has_loops(plan, found->func) ||
       plan.of(found->func).placement.compute.kind != Level::Kind::Root)
     return std::nullopt;

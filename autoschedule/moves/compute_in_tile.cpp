@@ -25,7 +25,7 @@ struct Side {
 };
 
 // The stage that alone reads the Func, and not through others.
-std::optional<StageId> only_reader(const Plan& plan, const Context& context, FuncId func) {
+std::optional<StageId> direct_reader(const Plan& plan, const Context& context, FuncId func) {
   const std::vector<StageId> readers = all_readers(plan, context, func);
   if (readers.size() != 1 || !has_loops(plan, readers[0].func)) return std::nullopt;
   return readers[0];
@@ -137,7 +137,7 @@ std::vector<Plan> compute_in_tile(const Plan& plan, FuncId func, const Context& 
   if (!has_loops(plan, func) || !may_run_in_loops(plan, context, func) ||
       !runs_at_any_size(plan.of(func), context, func))
     return plans;
-  const std::optional<StageId> reader = only_reader(plan, context, func);
+  const std::optional<StageId> reader = direct_reader(plan, context, func);
   if (!reader) return plans;
   add_plans(plans, plan, func, *reader, context);
   // In a loop of another Func the consumer may have no room for a tile.

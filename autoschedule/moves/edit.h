@@ -25,6 +25,8 @@ bool is_free(const Context& context, StageId stage, int iterator);
 bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, size_t depth);
 // The stages that read the Func, also through inlined Funcs; those of inlined Funcs, too.
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func);
+// The stage with loops that alone reads the Func, perhaps through inlined ones; nullopt: there are more, or none.
+std::optional<StageId> only_reader(const Plan& plan, const Context& context, FuncId func);
 // Visits what a stage reads, also through inlined Funcs, with the iterators of the stage that move each index.
 using MovedIndices = std::vector<IteratorSet>;
 void for_each_read(const Plan& plan, const Context& context, StageId stage,

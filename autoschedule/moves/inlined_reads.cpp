@@ -30,4 +30,14 @@ void for_each_read(const Plan& plan, const Context& context, StageId stage,
     follow(read, ir::mapped(read.index, &IndexForm::moved_by));
 }
 
+std::optional<StageId> only_reader(const Plan& plan, const Context& context, FuncId func) {
+  std::optional<StageId> only;
+  for (const StageId reader : all_readers(plan, context, func)) {
+    if (is_inlined(plan, reader.func)) continue;
+    if (only) return std::nullopt;
+    only = reader;
+  }
+  return only;
+}
+
 }  // namespace retrograde::planning::moves

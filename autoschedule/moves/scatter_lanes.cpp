@@ -159,17 +159,6 @@ std::optional<Plan> along_dimension(const Plan& plan, FuncId func, const Context
   return with_func(plan, func, std::move(changed), context, Terms::InAnyOrder);
 }
 
-// The stage that reads a Func, also through inlined Funcs; nullopt: there are more.
-std::optional<StageId> only_reader(const Plan& plan, const Context& context, FuncId func) {
-  std::optional<StageId> only;
-  for (const StageId reader : all_readers(plan, context, func)) {
-    if (is_inlined(plan, reader.func)) continue;
-    if (only) return std::nullopt;
-    only = reader;
-  }
-  return only;
-}
-
 // The nest in which a step of an iterator is outside of all loops but those of `around`, and its points just around the
 // body; nullopt: they are no such loops.
 std::optional<Nest> in_slices_along(Nest nest, int iterator, int64_t step, IteratorSet around,

@@ -77,9 +77,9 @@ bool is_among(const FuncPtr& f, const std::vector<FuncPtr>& some) {
 }
 
 // Refuses to inline bodies that would be copied without end.
-void check_inlined_bodies(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+void check_inlined_bodies(const std::vector<FuncPtr>& outputs,
                           const std::vector<FuncPtr>& inlined) {
-  std::vector<FuncPtr> has_place = stored;  // what its user named, and what a schedule may store
+  std::vector<FuncPtr> has_place;  // all that a schedule may store
   for (const FuncPtr& f : topological_order(outputs)) {
     if (!is_among(f, inlined)) has_place.push_back(f);
   }
@@ -113,7 +113,7 @@ void check_chosen_places(const std::vector<FuncPtr>& outputs, const Autoschedule
     finder.check_inlined(f);
     inlined.push_back(f);
   }
-  if (!inlined.empty()) check_inlined_bodies(outputs, stored, inlined);
+  if (!inlined.empty()) check_inlined_bodies(outputs, inlined);
 }
 
 }  // namespace retrograde::driver

@@ -118,20 +118,13 @@ planning::Atomics atomics_of(const AutoscheduleOptions& options) {
   return options.deterministic ? planning::Atomics::OfIntegers : planning::Atomics::OfAll;
 }
 
-PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<FuncPtr>& unscheduled,
-                        const AutoscheduleOptions& options, const planning::Machine& machine,
-                        const PlanSearchOptions& search) {
-  const std::vector<FuncPtr> outputs = graph::apply_wrappers(graph);
-  PlanSearch result{{}, planning::import_plan(outputs)};
-  const Plan& given = result.given;
-  planning::AccessGraph known;
-  if (search.accesses) known = std::move(*search.accesses);
-  const planning::AccessGraph accesses(outputs, std::move(known));
-  const planning::SizeModel sizes(accesses, {planning::unknown_extent});
-  planning::Dependences dependences(accesses);
-  planning::CostModel cost(accesses, sizes, machine, search.device);
-  const planning::Context context{accesses,    sizes,         machine,
-                                  dependences, search.device, atomics_of(options)};
+namespace {
+
+// All but the width of the beam and the limit of bytes.
+planning::SearchOptions limits_of_search(const std::vector<FuncPtr>& outputs, const Plan& given,
+                                         const std::vector<FuncPtr>& unscheduled,
+                                         const AutoscheduleOptions& options,
+                                         const PlanSearchOptions& search) {
   planning::SearchOptions beam;
   beam.kept = kept_funcs(given, kept_names(unscheduled, options, search.what));
   // The cost does not know that lowering keeps a few steps where these are at root.
@@ -153,6 +146,38 @@ PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<Fun
   // The start is known to be slow, so small gains count, too.
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = search.device ? 0 : least_gain_of_all_from_nothing;
+  return beam;
+}
+
+// Plans that were found get the parallel loops that this number of threads wants.
+void give_tasks(std::span<FoundPlan> found, int threads, const planning::Context& context,
+                const std::vector<bool>& kept) {
+  planning::Machine machine = context.machine;
+  machine.threads = threads;
+  const planning::Context threaded{context.accesses,    context.sizes,  machine,
+                                   context.dependences, context.device, context.atomics};
+  planning::CostModel cost(context.accesses, context.sizes, machine, context.device);
+  for (FoundPlan& each : found)
+    each.plan = planning::with_tasks(std::move(each.plan), kept, threaded, cost);
+}
+
+}  // namespace
+
+PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<FuncPtr>& unscheduled,
+                        const AutoscheduleOptions& options, const planning::Machine& machine,
+                        const PlanSearchOptions& search) {
+  const std::vector<FuncPtr> outputs = graph::apply_wrappers(graph);
+  PlanSearch result{{}, planning::import_plan(outputs)};
+  const Plan& given = result.given;
+  planning::AccessGraph known;
+  if (search.accesses) known = std::move(*search.accesses);
+  const planning::AccessGraph accesses(outputs, std::move(known));
+  const planning::SizeModel sizes(accesses, {planning::unknown_extent});
+  planning::Dependences dependences(accesses);
+  planning::CostModel cost(accesses, sizes, machine, search.device);
+  const planning::Context context{accesses,    sizes,         machine,
+                                  dependences, search.device, atomics_of(options)};
+  planning::SearchOptions beam = limits_of_search(outputs, given, unscheduled, options, search);
   const Plan nothing = planning::plan_from_nothing(given, beam.kept, context);
   result.result = planning::search(nothing, context, cost, beam);
   if (search.width > 1) {
@@ -161,19 +186,16 @@ PlanSearch search_plans(const std::vector<FuncPtr>& graph, const std::vector<Fun
   }
   beam.most_bytes = static_cast<double>(search.spare_bytes);
   const auto count = std::min(result.result.found.size(), static_cast<size_t>(search.width));
-  for (FoundPlan& found : std::span(result.result.found).first(count)) {
+  const std::span<FoundPlan> best = std::span(result.result.found).first(count);
+  for (FoundPlan& found : best) {
     const double most_seconds = search.must_fit ? std::numeric_limits<double>::infinity()
                                                 : worth_fitting * found.cost.seconds;
     found = planning::fit_memory(std::move(found), context, cost, beam, most_seconds);
-    if (search.threads > 0 && search.threads != machine.threads) {
-      planning::Machine threaded = machine;
-      threaded.threads = search.threads;
-      planning::CostModel cost_of_tasks(accesses, sizes, threaded, search.device);
-      const planning::Context of_tasks{accesses,    sizes,         threaded,
-                                       dependences, search.device, atomics_of(options)};
-      found.plan = planning::with_tasks(std::move(found.plan), beam.kept, of_tasks, cost_of_tasks);
-    }
-    if (options.without.contains(Decision::TaskSizes)) keep_outermost_tasks(found.plan, beam.kept);
+  }
+  if (search.threads > 0 && search.threads != machine.threads)
+    give_tasks(best, search.threads, context, beam.kept);
+  if (options.without.contains(Decision::TaskSizes)) {
+    for (FoundPlan& found : best) keep_outermost_tasks(found.plan, beam.kept);
   }
   return result;
 }

@@ -84,17 +84,4 @@ double terms_of(const Definition& stage, double of_unknown) {
   return terms;
 }
 
-int bits_of_values(const std::vector<Expr>& values) {
-  int bits = 1;
-  NodeSet visited;
-  for (const Expr& value : values) {
-    bits = std::max(bits, value.type().bits());
-    walk_once(value, visited, [&](const Expr& e) {
-      if (!is_const(e)) bits = std::max(bits, e.type().bits());
-      return !is_read(e);
-    });
-  }
-  return bits;
-}
-
 }  // namespace retrograde::transform

@@ -24,10 +24,7 @@ double operations_of(const Expr& node);
 // `of_call` says, beside its indices. Integer values are work, too: a vector holds more of narrow ones.
 double operations_of_values(const std::vector<Expr>& values,
                             FunctionRef<double(const Call&)> of_call);
-// Iterations of its reduction domain: what a sum adds up for an element. Of a loop whose extent is not
-// known so many as given.
+// The iterations of its reduction domain: the terms of a sum for an element. Loops of unknown extent have `of_unknown`.
 double terms_of(const Definition& stage, double of_unknown);
-// The bits of the widest number that a value is made of, indices aside.
-int bits_of_values(const std::vector<Expr>& values);
 
 }  // namespace retrograde::transform

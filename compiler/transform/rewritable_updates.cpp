@@ -22,7 +22,7 @@ bool has_effects(const Definition& update) {
 bool RewritableUpdates::contain(const FuncContents& f, const Definition& update, int64_t most) {
   const bool is_part = f.made && (f.made->lanes > 0 || f.made->has_parts || f.made->blocks > 0);
   return !is_part && !f.is_extern() && !has_directives(f) && !point_number(update) &&
-         !has_effects(update) && !hosted_.are_in(f) && read_elsewhere(f, update).defined() &&
+         !has_effects(update) && !hosts_.contains(f.name) && read_elsewhere(f, update).defined() &&
          has_few_pure_elements(f, update, most);
 }
 

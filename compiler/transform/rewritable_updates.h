@@ -15,7 +15,7 @@ namespace retrograde::transform {
 class RewritableUpdates {
  public:
   explicit RewritableUpdates(const std::vector<FuncPtr>& outputs)
-      : outputs_(outputs), hosted_(outputs) {}
+      : outputs_(outputs), hosts_(hosts_in(outputs)) {}
 
   // Whether the update reads other elements than the one it writes, and neither it nor its Func has directives, effects,
   // parts of sums, Funcs in its loops, or more than `most` elements in its pure dimensions.
@@ -25,7 +25,7 @@ class RewritableUpdates {
   bool has_few_pure_elements(const FuncContents& f, const Definition& update, int64_t most);
 
   const std::vector<FuncPtr>& outputs_;
-  const HostedFuncs hosted_;
+  const std::set<std::string> hosts_;
   std::optional<SizeEstimate> sizes_;  // computed when it is needed
 };
 

@@ -98,8 +98,7 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& stage, const B
 
 }  // namespace
 
-SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs, const planning::Machine& machine)
-    : machine_(machine) {
+SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs) {
   const Scope<Interval> parameters = parameter_scope(outputs);
   const std::vector<FuncPtr> order = topological_order(outputs);
   for (auto it = order.rbegin(); it != order.rend(); ++it) {
@@ -145,15 +144,6 @@ std::optional<int64_t> SizeEstimate::extent(const FuncContents& f, size_t dimens
 Interval SizeEstimate::range(const FuncContents& f, size_t dimension) const {
   const auto found = boxes_.find(&f);
   return found == boxes_.end() ? Interval::everything() : found->second[dimension];
-}
-
-SizeEstimate SizeEstimate::with_extent(const FuncContents& f, size_t dimension,
-                                       int64_t extent) const {
-  SizeEstimate result = *this;
-  Box& box = result.boxes_[&f];
-  box.resize(f.args.size());
-  box[dimension] = {make_zero(Int(32)), make_const(Int(32), extent - 1)};
-  return result;
 }
 
 int64_t SizeEstimate::bytes(const FuncContents& f) const {

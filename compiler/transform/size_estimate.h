@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "analysis/interval.h"
-#include "autoschedule/machine/machine.h"
 #include "graph/function.h"
 
 namespace retrograde::transform {
@@ -20,20 +19,15 @@ Interval constant_ends(const Interval& i);
 class SizeEstimate {
  public:
   SizeEstimate() = default;  // nothing is known
-  explicit SizeEstimate(const std::vector<FuncPtr>& outputs, const planning::Machine& machine = {});
+  explicit SizeEstimate(const std::vector<FuncPtr>& outputs);
   // Elements of a dimension that are computed; nullopt: not known.
   std::optional<int64_t> extent(const FuncContents& f, size_t dimension) const;
   // Between which elements these lie; unbounded: not known.
   Interval range(const FuncContents& f, size_t dimension) const;
-  // The same, but that so much of one dimension is computed at a time.
-  SizeEstimate with_extent(const FuncContents& f, size_t dimension, int64_t extent) const;
   // Bytes of all elements that are computed; 0 where some extent is not known.
   int64_t bytes(const FuncContents& f) const;
-  // The machine whose caches sizes are compared with.
-  const planning::Machine& machine() const { return machine_; }
 
  private:
-  planning::Machine machine_;
   std::unordered_map<const Symbol*, Box> boxes_;  // with constant ends; undefined: not known
 };
 

@@ -25,6 +25,17 @@ constexpr int64_t most_pure_elements = 4;
 // Operations of a value from which a vector saves more than loads and stores with a stride cost.
 constexpr double vectors_pay = 8;
 
+// How many points of a front run at once, and whether in a vector or unrolled.
+struct FrontLanes {
+  int rows = 1;
+  bool in_vectors = false;
+};
+FrontLanes front_lanes(const Definition& update) {
+  const double operations = operations_of_values(update.values, [](const Call&) { return 0.0; });
+  const bool in_vectors = operations >= vectors_pay;
+  return {in_vectors ? planning::schedule_lanes : unrolled_rows, in_vectors};
+}
+
 // How many dimensions of the written element the variable moves; -1: one of them by more than one element.
 int moved_dimensions(const Definition& update, const std::string& variable) {
   int moved = 0;
@@ -129,12 +140,6 @@ class Skewer {
 };
 
 }  // namespace
-
-FrontLanes front_lanes(const Definition& update) {
-  const double operations = operations_of_values(update.values, [](const Call&) { return 0.0; });
-  const bool in_vectors = operations >= vectors_pay;
-  return {in_vectors ? planning::schedule_lanes : unrolled_rows, in_vectors};
-}
 
 bool has_wavefronts(const std::vector<FuncPtr>& outputs) {
   WavefrontFinder finder(outputs);

@@ -33,13 +33,6 @@
 
 namespace retrograde::transform {
 
-// How many points of a front run at once, and whether in a vector or unrolled.
-struct FrontLanes {
-  int rows = 1;
-  bool in_vectors = false;
-};
-FrontLanes front_lanes(const Definition& update);
-
 // Whether some Func has such an update.
 bool has_wavefronts(const std::vector<FuncPtr>& outputs);
 // Rewrites these updates. The graph must be the compiler's own copy, as definitions change.
