@@ -105,7 +105,9 @@ static bool is_unlikely(const Expr& condition) {
 }
 
 // Arrays on the stack that unlikely code reads stay in memory. In registers, they would take those of the loops before it.
+// Threads of a device have their stack in slow memory, and more registers.
 void FunctionGenerator::keep_in_memory(const Stmt& read_by) {
+  if (c_.e.machine.is_device()) return;
   std::set<std::string> read, written;
   walk(
       read_by, [&](const ir::Load& load) { read.insert(load.name); },
@@ -124,11 +126,12 @@ void FunctionGenerator::make(const IfThenElse& s) {
   Value* condition = values_.alone(s.condition);
   llvm::BasicBlock *then_block = c_.new_block("then"), *after = c_.new_block("after");
   llvm::BasicBlock* else_block = s.when_false.defined() ? c_.new_block("else") : after;
+  const bool unlikely = is_unlikely(s.condition);
   llvm::MDBuilder weights(c_.e.context());
   b_.CreateCondBr(condition, then_block, else_block,
-                  is_unlikely(s.condition) ? weights.createUnlikelyBranchWeights() : nullptr);
+                  unlikely ? weights.createUnlikelyBranchWeights() : nullptr);
   b_.SetInsertPoint(then_block);
-  if (is_unlikely(s.condition)) keep_in_memory(s.when_true);
+  if (unlikely) keep_in_memory(s.when_true);
   statement(s.when_true);
   b_.CreateBr(after);
   if (s.when_false.defined()) {
