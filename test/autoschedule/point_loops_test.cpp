@@ -1,5 +1,5 @@
-// Vectors along the points of Funcs that have a few numbers for each: which Funcs get them, where their sums are computed
-// and stored, and that values and gradients are those of the interpreter on any number of threads.
+// Funcs that have a few numbers for each of many points, as the autoscheduler runs them: values and gradients are those of
+// the interpreter on any number of threads.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -25,32 +25,6 @@ constexpr int many = 150, bones = 7;
 Func scheduled(Func f) {
   Pipeline(f).auto_schedule(get_host_target());
   return f;
-}
-
-const graph::Dim& innermost(const Func& f, int stage) {
-  return f.function()->stage(stage).schedule.dims.front();
-}
-// Whether vectors of a stage run along this dimension.
-bool has_vectors_along(const Func& f, int stage, const Var& dimension) {
-  const graph::Dim& loop = innermost(f, stage);
-  const auto& splits = f.function()->stage(stage).schedule.splits;
-  return loop.runs == ForType::Vectorized &&
-         std::ranges::any_of(splits, [&](const graph::Split& split) {
-           return split.inner == loop.var && split.old_var == dimension.name();
-         });
-}
-int count_unrolled(const Func& f, int stage) {
-  return static_cast<int>(std::ranges::count(f.function()->stage(stage).schedule.dims,
-                                             ForType::Unrolled, &graph::Dim::runs));
-}
-std::string innermost_in_memory(const Func& f) {
-  const graph::FuncContents& contents = *f.function();
-  return contents.schedule.storage_dims.empty() ? contents.args[0]
-                                                : contents.schedule.storage_dims[0];
-}
-bool is_inside(const Func& f, const Func& host) {
-  const graph::LoopLevel& level = f.function()->schedule.compute_level;
-  return level.kind == graph::LoopLevel::Kind::At && level.func == host.name();
 }
 
 // Points blended from the transformations of bones.

@@ -1,5 +1,5 @@
-// The autoscheduler's vectors along rows that a reduction reads: which reductions get them, and that the results are
-// those of vectors of elements, closer to the exact ones, with the same bits on any number of threads.
+// Reductions along rows, as the autoscheduler runs them: results are those of the declared order or closer to the exact
+// ones, with the same bits on any number of threads.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -9,7 +9,6 @@
 
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
-#include "support/schedule_log.h"
 #include "support/variables.h"
 
 namespace retrograde {
@@ -19,15 +18,6 @@ constexpr int rows = 37;
 
 Buffer<float> matrix(int width, int height = rows) {
   return gradient::random_image({width, height}, -1, 2, 5);
-}
-
-// The loops of the update, innermost first, as far as they run in vectors.
-const graph::Dim& innermost(const Func& f, int update = 0) {
-  return f.function()->updates.at(static_cast<size_t>(update)).schedule.dims.front();
-}
-bool runs_along_rows(const Func& f, int update = 0) {
-  const graph::Dim& loop = innermost(f, update);
-  return loop.is_reduction && loop.runs == ForType::Vectorized;
 }
 
 Func scheduled(Func f) {

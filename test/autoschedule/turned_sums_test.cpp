@@ -1,4 +1,5 @@
-// Gradients by the weights of strided layers: vectors run along channels instead of along strided terms, with the same bits.
+// Gradients by the weights of strided layers, as the autoscheduler runs them: right, with the same bits for each decision
+// that is left out and each number of threads.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -6,10 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <set>
-#include <string>
 
 #include "gradient/gradient_check.h"
-#include "support/schedule_log.h"
 
 namespace retrograde {
 namespace {
@@ -71,15 +70,6 @@ struct StridedLayer {
       }
     }
     return error;
-  }
-  // Whether the sums have rows along this dimension.
-  bool has_rows_along(int dimension) const {
-    Pipeline pipeline = gradient();
-    pipeline.auto_schedule(get_host_target());
-    const std::string row = "_" + std::to_string(dimension);
-    const ScheduleLog log = pipeline.schedule_log();
-    return any_directive<graph::ReorderStorage>(
-        log, [&](const auto&, const auto& d) { return d.dimensions.at(0) == row; });
   }
 
   int stride = 1, out_size = 0;
