@@ -331,13 +331,10 @@ bool Dependences::can_prove_at_once(StageId stage, int iterator, IteratorSet aro
   const FuncContents& f = *graph_.func(stage.func).func;
   const Definition& update = f.stage(stage.stage);
   const std::string& name = node.iterators[static_cast<size_t>(iterator)].name;
-  const auto is_moved = [&](const Expr& place) { return uses_variable(place, name); };
-  // Otherwise all iterations update one element.
-  if (std::ranges::none_of(update.args, is_moved) || has_many_clamps(f, update)) return false;
   std::unordered_set<std::string> names;
   for (size_t i = 0; i < node.iterators.size(); ++i)
     if (around & set_of(static_cast<int>(i))) names.insert(node.iterators[i].name);
-  return can_prove_race_free(f, update, name, names);
+  return can_prove_race_free(f, update, name, names, /*in_kernel=*/false, ProofEffort::Quick);
 }
 
 bool Dependences::commutes(StageId stage) {

@@ -23,7 +23,7 @@ namespace retrograde::analysis {
 namespace {
 
 constexpr unsigned long most_operations = 1'000'000;  // isl's limit, about a second
-constexpr size_t most_unknowns = 60;
+constexpr size_t most_unknowns = 60, most_quick_unknowns = 16;
 constexpr int most_tests = 100;
 constexpr int max_depth = 16;  // of nested divisions and minima
 
@@ -32,6 +32,9 @@ Sum number(int64_t value) { return linear_sum(Int(64), value); }
 // A conjunction of conditions on integers.
 class Conditions {
  public:
+  explicit Conditions(ProofEffort effort)
+      : most_unknowns_(effort == ProofEffort::Full ? most_unknowns : most_quick_unknowns) {}
+
   Sum unknown() {
     const std::string name = text("u", numbers_.size());
     numbers_.emplace(name, static_cast<int>(numbers_.size()));
@@ -52,7 +55,7 @@ class Conditions {
 
   // Whether the sum is certainly negative under the conditions so far, choices aside.
   bool exclude(const Sum& sum) {
-    if (!sum.valid || numbers_.size() > most_unknowns) return false;
+    if (!sum.valid || numbers_.size() > most_unknowns_) return false;
     inequalities_.push_back(sum);
     const bool result = are_empty();
     inequalities_.pop_back();
@@ -62,7 +65,7 @@ class Conditions {
   // Whether the conditions certainly have no solution. Choices are made one after the other, those of the last
   // coordinates first: they tell steps apart.
   bool contradict() {
-    if (numbers_.size() > most_unknowns || ++tests_ > most_tests) return false;
+    if (numbers_.size() > most_unknowns_ || ++tests_ > most_tests) return false;
     if (are_empty()) return true;
     if (choices_.empty()) return false;
     const auto [a, b] = choices_.back();
@@ -99,6 +102,7 @@ class Conditions {
   std::vector<Sum> equalities_, inequalities_;
   std::vector<std::pair<Sum, Sum>> choices_;
   int tests_ = 0;
+  const size_t most_unknowns_;
 
   isl_basic_set* constrained(isl_basic_set* set, isl_constraint* constraint, const Sum& sum) const {
     isl_ctx* ctx = isl_basic_set_get_ctx(set);
@@ -269,7 +273,7 @@ bool can_prove_never_meet(const MeetingPoints& points, const PointOrder& order, 
     for (const std::string& loop : *differing) fixed.erase(loop);
   }
   fixed.insert(order.same.begin(), order.same.end());
-  Conditions conditions;
+  Conditions conditions(points.effort);
   Known shared;
   Point first(conditions, shared, points, fixed, a.where);
   Point second(conditions, shared, points, fixed, b.where);

@@ -17,6 +17,9 @@
 
 namespace retrograde::analysis {
 
+// How large the conditions of a proof may be. isl takes up to a second for the largest, and a search asks for many proofs.
+enum class ProofEffort { Full, Quick };
+
 // The points of a loop nest: variables with their ranges, and conditions that hold at every point.
 struct MeetingPoints {
   struct Variable {
@@ -25,6 +28,7 @@ struct MeetingPoints {
   };
   std::vector<Variable> variables;
   std::vector<Expr> conditions;
+  ProofEffort effort = ProofEffort::Full;
 };
 
 // How the second of two points lies to the first one, in the order of the loops.

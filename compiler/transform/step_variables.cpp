@@ -19,6 +19,7 @@ namespace {
 using Names = std::vector<std::string>;
 
 constexpr size_t most_variables = 5;
+constexpr size_t most_clamps = 5;  // of an access: with more, proofs take long and seldom succeed
 constexpr int64_t least_row = 4;
 
 Names joined(Names a, const Names& b) {
@@ -51,7 +52,7 @@ class StepFinder {
   StepVariables find() {
     const size_t count = variables_.size();
     if (count == 0 || count > most_variables || point_number(update_) ||
-        graph::has_many_clamps(f_, update_))
+        clamps_of_an_access() > most_clamps)
       return {};
     for (const std::string& variable : variables_)
       is_apart_.push_back(graph::can_prove_race_free(f_, update_, variable));
@@ -72,6 +73,23 @@ class StepFinder {
   }
 
  private:
+  // The average number of minima and maxima in the coordinates of an access. A proof looks at the cases of each.
+  size_t clamps_of_an_access() const {
+    size_t clamps = 0;
+    const auto count = [&](const std::vector<Expr>& coordinates) {
+      for (const Expr& e : coordinates) {
+        walk(e, [&](const Expr& part) {
+          clamps += part.kind() == Kind::Min || part.kind() == Kind::Max;
+          return true;
+        });
+      }
+    };
+    const std::vector<Expr> reads = graph::own_reads(f_, update_);
+    count(update_.args);
+    for (const Expr& read : reads) count(read.as<Call>()->args);
+    return clamps / (reads.size() + 1);
+  }
+
   bool has_apart(unsigned bits) const {
     for (size_t i = 0; i < is_apart_.size(); ++i) {
       if ((bits >> i & 1u) && is_apart_[i]) return true;

@@ -30,6 +30,14 @@ retrograde_test(tune_test LIBS retrograde_tune_parts retrograde_dep_halide_runti
 
 # The access graph. Its headers are in the top-level folder.
 retrograde_test(access_graph_test access_queries_test dependences_test READS_FILES LIBS retrograde_dep_halide_runtime)
-foreach(name access_graph_test access_queries_test dependences_test)
+# In shadow, dependences answer for the programs of the gradient suite.
+retrograde_test(dependences_shadow_test
+  SOURCES autoschedule/dependences_shadow_test.cpp
+          gradient/programs_accesses.cpp gradient/programs_large.cpp
+          gradient/programs_pathologies.cpp gradient/programs_pointwise.cpp gradient/update_programs.cpp
+          gradient/update_reductions.cpp gradient/update_filters.cpp gradient/update_scans.cpp
+          gradient/update_steps.cpp
+  LIBS retrograde_dep_halide_runtime)
+foreach(name access_graph_test access_queries_test dependences_test dependences_shadow_test)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
 endforeach()

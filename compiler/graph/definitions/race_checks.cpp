@@ -191,8 +191,10 @@ Expr read_of_other_element(const FuncContents& f, const Definition& update) {
 }
 
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
-                         const std::unordered_set<std::string>& around, bool in_kernel) {
-  const MeetingPoints points = points_of(update);
+                         const std::unordered_set<std::string>& around, bool in_kernel,
+                         analysis::ProofEffort effort) {
+  MeetingPoints points = points_of(update);
+  points.effort = effort;
   const Access write{update.args, {}};
   if (!can_prove_never_meet(points, rvar, write, write, around)) return false;
   const Access change{update.args, in_kernel ? Expr() : changes_where(f, update)};
@@ -259,23 +261,6 @@ bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
     return can_prove_never_meet(points, equal, pair.first, pair.second) &&
            can_prove_never_meet(points, earlier, pair.first, pair.second);
   });
-}
-
-bool has_many_clamps(const FuncContents& f, const Definition& update) {
-  constexpr size_t many = 6;
-  size_t clamps = 0;
-  const auto count = [&](const std::vector<Expr>& coordinates) {
-    for (const Expr& e : coordinates) {
-      walk(e, [&](const Expr& part) {
-        clamps += part.kind() == Kind::Min || part.kind() == Kind::Max;
-        return true;
-      });
-    }
-  };
-  const std::vector<Expr> reads = own_reads(f, update);
-  count(update.args);
-  for (const Expr& read : reads) count(read.as<Call>()->args);
-  return clamps / (reads.size() + 1) >= many;
 }
 
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {

@@ -6,6 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "analysis/never_meet.h"
 #include "graph/function.h"
 
 namespace retrograde::graph {
@@ -24,8 +25,8 @@ namespace retrograde::graph {
 // In a kernel, such stores count as changes, and reads for an arm of a select that is not taken as reads: its threads
 // promise nothing about either.
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
-                         const std::unordered_set<std::string>& around = {},
-                         bool in_kernel = false);
+                         const std::unordered_set<std::string>& around = {}, bool in_kernel = false,
+                         analysis::ProofEffort effort = analysis::ProofEffort::Full);
 
 // Whether loops over the reduction variables in the order `after`, instead of `before`, run every two
 // iterations that access one element in the same order, if one of them writes it. Both lists hold all
@@ -43,10 +44,6 @@ bool can_prove_same_order(const FuncContents& f, const Definition& update,
 //   d(r.x, r.y) = f(d(r.x - 1, r.y), d(r.x + 1, r.y - 1))   slope 2
 bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
                             const std::string& inner, const std::string& outer, int slope);
-
-// Whether the coordinates of an access have so many minima and maxima, on average, that a proof over the cases of each
-// would take long and seldom succeed.
-bool has_many_clamps(const FuncContents& f, const Definition& update);
 
 // Whether all points of the update commute: it is f(same point) op e with an operator that is
 // proven associative and commutative, for ties too. Floats are included, although reordering
